@@ -35,14 +35,14 @@ def chromium() -> Iterator[Any]:
 
 
 @contextmanager
-def page_at(browser: Any, address: str, **options: Any) -> Iterator[Any]:
+def page_at(browser: Any, address: str, ready: str = READY, **options: Any) -> Iterator[Any]:
     """Open a page, its lanes and paused if the address doesn't say; fail if it reports an error."""
     context = browser.new_context(**{"viewport": {"width": 1280, "height": 860}, **options})
     page = context.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(address if "#" in address else f"{address}#view=lanes&speed=60")
-    page.wait_for_selector(READY, timeout=60_000)
+    page.wait_for_selector(ready, timeout=60_000, state="attached")
     yield page
     context.close()
     assert [] == errors, errors

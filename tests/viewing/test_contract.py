@@ -1,5 +1,6 @@
 """The page's types and its bundle are those of the sources."""
 
+import gzip
 import hashlib
 from pathlib import Path
 
@@ -16,6 +17,11 @@ pytestmark = pytest.mark.skipif(not SOURCES.exists(), reason="the page's sources
 
 def test_types_of_the_page_are_written_from_those_of_python() -> None:
     assert contract_source() == (SOURCES / "src" / "contract.ts").read_text(encoding="utf-8")
+
+
+def test_bundle_is_small() -> None:
+    content = b"".join((PAGE / name).read_bytes() for name in ("page.js", "page.css"))
+    assert len(gzip.compress(content)) < 150_000
 
 
 def test_bundle_was_built_from_these_sources() -> None:

@@ -1,15 +1,18 @@
 """Pictures of moments and stretches, films, reports: written completely, in the requested format."""
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from tests.scenes import Cli, scenario
 
 import fleet2d
 from fleet2d.engine.access import evidence_of
 from fleet2d.errors import InputError
+from fleet2d.kernels import U8
 from fleet2d.viewing.figures import draw_failure, draw_moment, draw_stretch
-from fleet2d.viewing.film import write_film
+from fleet2d.viewing.film import LitHome, draw_frames, stage_of, write_film
 from fleet2d.viewing.report import write_report
 from fleet2d.viewing.stage import Stage
 
@@ -62,6 +65,26 @@ def test_bodies_stand_where_the_run_has_them(run_dir: Path) -> None:
     disc = discs.get_paths()[-1].get_extents()
     assert "Astro" == name.get_text()
     assert (path.x[25_321], path.y[25_321]) == pytest.approx((disc.p0 + disc.p1) / 2)
+
+
+def test_kept_pictures_of_the_lit_home_change_no_frame(
+    run_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def filmed() -> list[U8]:
+        stage = stage_of(fleet2d.open_run(run_dir), 20_000, 25_000, 100, 240)
+        return [pixels.copy() for _, pixels in draw_frames(stage, 20_000, np.arange(50))]
+
+    def draw_anew(home: LitHome, draw: Any) -> None:
+        home._lit.clear()
+        lights.add(home._stage.light_key)
+        restore(home, draw)
+
+    lights: set[object] = set()
+    restore = LitHome.restore
+    kept = filmed()
+    monkeypatch.setattr(LitHome, "restore", draw_anew)
+    assert all(np.array_equal(one, other) for one, other in zip(kept, filmed(), strict=True))
+    assert len(lights) > 1
 
 
 @pytest.mark.parametrize("ending", [".gif", ".webp"])

@@ -241,6 +241,62 @@ def test_zoomed_plan_has_a_button_to_the_whole(browser: Any, run_dir: Path) -> N
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("view", ["calendar", "lanes"])
+def test_print_shows_plan_and_timeline_and_nothing_to_press(
+    browser: Any, run_dir: Path, view: str
+) -> None:
+    link = f"#view={view}&at=2026-01-05T07:30:00"
+    with served(run_dir) as address, page_at(browser, address + link) as page:
+        page.emulate_media(media="print")
+        for shown in (".plan canvas.top", ".calendar canvas" if view == "calendar" else ".lanes"):
+            box = page.locator(shown).first.bounding_box()
+            assert box["width"] > 300
+            assert box["height"] > 100
+        for hidden in (".controls", "[role=tablist]", ".ask", ".menu", ".help", ".goto"):
+            assert not page.locator(hidden).first.is_visible()
+        assert page.pdf().startswith(b"%PDF")
+
+
+PIXELS = """() => [...document.querySelectorAll(".plan canvas")].map((canvas) => {
+  const { width, height } = canvas;
+  const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+  let hash = 0;
+  for (const value of data) hash = (31 * hash + value) | 0;
+  return [width, height, hash];
+})"""
+
+
+@pytest.mark.slow
+def test_file_and_cell_of_a_notebook_look_as_the_served_page(
+    browser: Any, run_dir: Path, tmp_path: Path
+) -> None:
+    run = fleet2d.open_run(run_dir)
+    target = tmp_path / "run.html"
+    export_html(run, target)
+    size = {"width": 1100, "height": 800}
+    link = "#view=lanes&at=2026-01-05T07:30:00"
+    looks = []
+    with served(run_dir) as address:
+        for place in (address + link, target.as_uri() + link):
+            with page_at(browser, place, viewport=size) as page:
+                page.wait_for_timeout(500)
+                looks.append(page.evaluate(PIXELS))
+    with page_at(browser, "about:blank#", viewport=size, ready="body") as page:
+        page.set_content('<iframe sandbox="allow-scripts" width="1100" height="800"></iframe>')
+        page.add_style_tag(content="body { margin: 0 } iframe { border: 0 }")
+        text = target.read_text(encoding="utf-8")
+        page.eval_on_selector("iframe", "(frame, text) => { frame.srcdoc = text; }", text)
+        frame = page.frames[-1]
+        frame.wait_for_selector("html[data-ready=true]")
+        frame.fill("#goto", "day 1 07:30")
+        frame.press("#goto", "Enter")
+        frame.get_by_role("button", name="Lanes", exact=True).click()
+        page.wait_for_timeout(500)
+        looks.append(frame.evaluate(PIXELS))
+    assert looks[0] == looks[1] == looks[2]
+
+
+@pytest.mark.slow
 def test_click_on_a_plan_inspects_that_plan(browser: Any, run_dir: Path, other_dir: Path) -> None:
     with served(run_dir, other_dir) as address, page_at(browser, address) as page:
         for number, name in enumerate((run_dir.name, other_dir.name)):
