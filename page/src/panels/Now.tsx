@@ -42,7 +42,7 @@ export function bodyState(run: Run, name: string, us: number): BodyState | null 
     headingDeg: (pose.heading * 360) / TURN,
     away: pose.away,
     activity: run.events.last(name, "activity", us)?.detail ?? "",
-    sees: sightings.filter((row) => row.robot === name).map((row) => `${row.user || "somebody"}${isFalse(row) ? " (false)" : ""}`),
+    sees: sightings.filter((row) => row.robot === name).map((row) => `${row.user ? run.label(row.user) : "somebody"}${isFalse(row) ? " (false)" : ""}`),
   };
 }
 
