@@ -141,7 +141,7 @@ function Overview({ run }: { run: Run }) {
   }, [run]);
   const seek = (event: PointerEvent): void => {
     if (event.type === "pointermove" && event.buttons !== 1) return;
-    state.goTo(momentAt(event));
+    state.goTo(momentAt(event), event.type === "pointermove");
   };
   const momentAt = (event: PointerEvent): number => {
     const { left, width } = canvas.current!.getBoundingClientRect();

@@ -84,12 +84,12 @@ const SCRUBBED_MS = 60;
 let toldAt = 0;
 let toldLater: ReturnType<typeof setTimeout> | undefined;
 
-/** Let words be about the moment that is shown: at once, or soon if they have just changed. */
-function tell(): void {
+/** Let words be about the moment that is shown, so many milliseconds after they changed. */
+function tell(after: number): void {
   clearTimeout(toldLater);
-  const wait = toldAt + (playing.peek() ? TOLD_MS : SCRUBBED_MS) - performance.now();
+  const wait = toldAt + after - performance.now();
   if (wait > 0) {
-    if (!playing.peek()) toldLater = setTimeout(tell, wait);
+    toldLater = setTimeout(() => tell(0), wait);
     return;
   }
   told.value = moment.peek();
@@ -100,7 +100,7 @@ function tell(): void {
  * Show a moment everywhere. While time passes it may lie between two steps; else it is that of a step, so that what
  * is shown is what the run stored.
  */
-export function goTo(us: number): void {
+export function goTo(us: number, isScrubbing = false): void {
   const end = endUs.value;
   const stepUs = run.value?.clock.stepUs ?? 1;
   const last = Math.max(beginUs.value, end - stepUs);
@@ -108,7 +108,7 @@ export function goTo(us: number): void {
   const at = playing.value ? inside : Math.floor(inside / stepUs) * stepUs;
   batch(() => {
     moment.value = at;
-    tell();
+    tell(playing.value ? TOLD_MS : isScrubbing ? SCRUBBED_MS : 0);
     const [from, to] = range.value;
     if (at < from || at > to) setRange(at - (to - from) / 2, at + (to - from) / 2);
   });

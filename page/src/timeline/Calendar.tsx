@@ -171,7 +171,7 @@ function Days({ run }: { run: Run }) {
   };
   const move = (event: PointerEvent): void => {
     const found = point(event);
-    if (event.buttons === 1 && found) state.goTo(found.us);
+    if (event.buttons === 1 && found) state.goTo(found.us, true);
     hover.value = found && !event.buttons ? { us: found.us, x: found.x, y: found.y, words: wordsAt(found) } : null;
   };
   const wordsAt = ({ us, down }: { us: number; down: number }): string => {

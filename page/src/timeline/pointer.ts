@@ -63,7 +63,7 @@ export function followPointer({ box, rows, hover }: PointerView): () => void {
     const [x, y] = place(event);
     const us = usOf(scale(), x);
     if (fingers.has(event.pointerId) && fingers.size === 2) pinch(event.pointerId, x);
-    else if (mode === "scrub" && Math.abs(x - startX) >= CLICK) state.goTo(us);
+    else if (mode === "scrub" && Math.abs(x - startX) >= CLICK) state.goTo(us, true);
     else if (mode === "range") state.marked.value = [usOf(scale(), startX), us];
     else if (mode === "pan") {
       const [from, to] = state.range.value;
