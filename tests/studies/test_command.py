@@ -67,6 +67,30 @@ def test_a_variant_is_run_again_and_compared(fleet2d: Cli) -> None:
     assert "give a number from 0 to 3" in err
 
 
+def test_a_variant_whose_metric_differs_is_not_reproduced(fleet2d: Cli) -> None:
+    """With a metric that had been changed since it was said to be reproduced: the digest has none."""
+    Path("own.py").write_text(
+        "from pathlib import Path\nfrom fleet2d import Metric\n\nclass Own(Metric):\n"
+        "    def update(self, *_): ...\n    def result(self):\n"
+        f"        return {{'all': int(Path({str(Path('number').absolute())!r}).read_text())}}\n"
+    )
+    Path("number").write_text("3")
+    study = yaml.safe_load(Path("speeds.yaml").read_text())
+    study["axes"]["metrics.own"] = [{"type": "own:Own"}]
+    study["keep"] = {"metrics": ["own.*"]}
+    study.pop("compare", None)
+    Path("own.yaml").write_text(yaml.safe_dump(study))
+    code, _, err = fleet2d("study", "run", "own.yaml", "--out", "own", *SERIAL)
+    assert 0 == code, err
+
+    assert 0 == fleet2d("study", "rerun", "own", "2", "--trust")[0]
+    Path("number").write_text("4")
+    code, out, err = fleet2d("study", "rerun", "own", "2", "--trust")
+    assert 1 == code
+    assert "reproduced" not in out
+    assert "not reproduced: the digest is the same, but own.all is 4.0 instead of 3.0" in err
+
+
 @pytest.mark.slow
 def test_a_report_is_written_beside_the_study(fleet2d: Cli) -> None:
     fleet2d("study", "run", "speeds.yaml", *SERIAL)

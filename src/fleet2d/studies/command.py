@@ -143,12 +143,13 @@ def rerun(
     out: Annotated[Path | None, typer.Option(help="Store the run in this directory.")] = None,
     trust: Trust = False,
 ) -> None:
-    """Run one variant again and compare the digests.
+    """Run one variant again and compare the digest and the metrics.
 
     Examples:
       fleet2d study rerun studies/speeds 12 --out variant
     """
     from fleet2d.studies.reader import open_study
+    from fleet2d.studies.simulator import flat_numbers
 
     study = open_study(location)
     row = _row_of(study, variant)
@@ -160,13 +161,24 @@ def rerun(
     repeated = study.rerun(number, out, trust=trust)
     if out is not None:
         _print(f"stored in {out}")
+    numbers = dict(flat_numbers(repeated.metrics))
+    known = [name for name in study.metrics if row[name] is not None]
+    differing = [name for name in known if str(numbers.get(name)) != str(row[name])]
     if row["digest"] is None:
         _print(f"digest {repeated.digest}; the study has no digest of this variant")
-    elif repeated.digest == row["digest"]:
-        _print(f"reproduced: digest {repeated.digest}")
-    else:
+    elif repeated.digest != row["digest"]:
         _print(f"not reproduced: {repeated.digest} instead of {row['digest']}", err=True)
         raise typer.Exit(1)
+    elif differing:
+        first = differing[0]
+        _print(
+            f"not reproduced: the digest is the same, but {first} is {numbers.get(first)} instead"
+            f" of {row[first]}: its code, which the digest doesn't have, may have changed",
+            err=True,
+        )
+        raise typer.Exit(1)
+    else:
+        _print(f"reproduced: digest {repeated.digest}")
 
 
 @studying.command()
@@ -321,7 +333,8 @@ def _row_of(study: "Study", variant: str) -> dict[str, Any]:
     Raises:
         InputError: There is no such variant, or several.
     """
-    rows = study.variants.select("variant", "identity", "digest", *study.columns).to_dicts()
+    columns = ("variant", "identity", "digest", *study.columns, *study.metrics)
+    rows = study.variants.select(*columns).to_dicts()
     found = [row for row in rows if str(row["variant"]) == variant]
     if not found and len(variant) >= IDENTITY_START:
         found = [row for row in rows if (row["identity"] or "").startswith(variant)]
