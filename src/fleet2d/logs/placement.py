@@ -309,13 +309,14 @@ def _nearest(label: str, rooms: Sequence[Room]) -> str:
 
 
 def _first_fit(choice: RoomChoice, rooms: Sequence[Room]) -> RoomChoice | None:
-    """Return the first of some names that is a room, a kind of room, away or door; else None."""
-    names = {AWAY, DOOR, "any", *(room.name for room in rooms), *(room.type for room in rooms)}
+    """Return the first of some names that is a room, a function of one, away or door; else None."""
+    names = {AWAY, DOOR, "any", *_names(rooms)}
     return next(((name,) for name in choice if name in names), None)
 
 
 def _names(rooms: Collection[Room]) -> list[str]:
-    return [room.name for room in rooms] + sorted({room.type for room in rooms})
+    names = [room.name for room in rooms]
+    return names + sorted({word for room in rooms for word in room.words} - set(names))
 
 
 class VisitRule(NamedTuple):
