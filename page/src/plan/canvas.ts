@@ -53,3 +53,29 @@ export function oncePerFrame(draw: () => void): () => void {
     });
   };
 }
+
+/** What waits to be drawn, the first one in the next frame. */
+const queue: (() => void)[] = [];
+
+function drawFirst(): void {
+  try {
+    queue[0]?.();
+  } finally {
+    queue.shift();
+    if (queue.length > 0) requestAnimationFrame(drawFirst);
+  }
+}
+
+/** As `oncePerFrame`, but of all that is drawn so only one is in a frame: many small pictures must not hold it up. */
+export function onePerFrame(draw: () => void): () => void {
+  let isWaiting = false;
+  return () => {
+    if (isWaiting) return;
+    isWaiting = true;
+    queue.push(() => {
+      isWaiting = false;
+      draw();
+    });
+    if (queue.length === 1) requestAnimationFrame(drawFirst);
+  };
+}

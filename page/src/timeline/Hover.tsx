@@ -3,7 +3,7 @@
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import type { Run } from "../data/run";
-import { oncePerFrame } from "../plan/canvas";
+import { onePerFrame } from "../plan/canvas";
 import { drawThumbnail, THUMBNAIL } from "../plan/thumbnail";
 
 export interface Hovered {
@@ -36,7 +36,7 @@ export function Thumbnail({ run, us, focus = "" }: { run: Run; us: number; focus
   const wanted = useRef(signal({ us, focus }));
   wanted.current.value = { us, focus };
   useEffect(() => {
-    const paint = oncePerFrame(() => {
+    const paint = onePerFrame(() => {
       if (canvas.current) drawThumbnail(canvas.current, run, wanted.current.value.us, wanted.current.value.focus);
     });
     // Small pictures wait until the large one is there.
