@@ -11,7 +11,7 @@ from tests.scenes import Cli
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import is_floorplan, load_floorplan, save_floorplan
 from fleet2d.floorplan.native import HOMES, native_document, native_schema
-from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
+from fleet2d.floorplan.placed_objects import PlacedObject, Portal, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine
 
@@ -63,6 +63,34 @@ def test_plan_with_everything_comes_back_equal(tmp_path: Path, suffix: str) -> N
     assert plan.objects == again.objects
     assert plan.doorways == again.doorways
     assert native_document(plan) == native_document(again)
+
+
+@pytest.mark.parametrize("suffix", ["json", "yaml", "geojson"])
+def test_storeys_stairs_and_panes_come_back(tmp_path: Path, suffix: str) -> None:
+    ground = shapely.difference(shapely.box(0, 0, 6, 5), shapely.box(3, 0, 3.1, 3))
+    storeys = shapely.MultiPolygon([ground, shapely.box(8, 0, 12, 5)])
+    pane = shapely.box(2.95, 0.5, 3.15, 1.5)
+    regions = [
+        LabelledRegion(("kitchen",), shapely.box(0, 0, 6, 5)),
+        LabelledRegion(("bedroom",), shapely.box(8, 0, 12, 5)),
+    ]
+    stairs = [
+        Portal("stairs", (5.0, 4.0), (11.0, 4.0), 7_500_000),
+        Portal("lift", (1.0, 4.0), (9.0, 4.0), 20_000_000),
+    ]
+    plan = FloorPlan.build("house", storeys, regions, glass=[pane]).with_portals(stairs)
+    path = tmp_path / f"house.{suffix}"
+
+    save_floorplan(plan, path)
+    again = load_floorplan(path)
+
+    assert tuple(stairs) == again.portals
+    assert (plan.rooms, plan.notes) == (again.rooms, again.notes)
+    # Of a pane the part within the wall counts; GeoJSON's panes have no more.
+    in_wall = [shapely.difference(p.glass[0], shapely.union_all(p.polygons)) for p in (plan, again)]
+    assert in_wall[0].area > 0
+    assert in_wall[0].equals(in_wall[1])
+    assert suffix == "geojson" or plan.digest == again.digest
 
 
 @pytest.mark.slow
