@@ -633,10 +633,11 @@ class FloorPlan:
                 )
         if not portals:
             return self
-        linked = f"storeys are linked by stairs and lifts, which robots don't use: {len(portals)}"
+        joined = (*self.portals, *portals)
+        linked = "storeys are linked by stairs and lifts, which robots don't use: "
         unjoined = part_notes(self.lattice, self.polygons)
-        notes = (*(note for note in self.notes if note not in unjoined), linked)
-        return replace(self, portals=(*self.portals, *portals), notes=notes)
+        notes = [n for n in self.notes if n not in unjoined and not n.startswith(linked)]
+        return replace(self, portals=joined, notes=(*notes, f"{linked}{len(joined)}"))
 
     def named(self, name: str) -> Self:
         """Return the same plan under another name."""
