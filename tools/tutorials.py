@@ -29,6 +29,11 @@ class Shown(DisplayHook):
     """Keeps what a cell's last expression shows, and prints nothing."""
 
     kept: list[dict[str, Any]] = []
+    source = ""
+
+    def quiet(self) -> bool:
+        """Return whether the cell ends in a semicolon, which shows nothing."""
+        return bool(self.semicolon_at_end_of_expression(self.source))
 
     def write_output_prompt(self) -> None:
         """Print no prompt."""
@@ -82,6 +87,7 @@ def run(notebook: dict[str, Any], shell: InteractiveShell) -> None:
 def outputs_of(source: str, shell: InteractiveShell) -> list[dict[str, Any]]:
     """Return the outputs of a cell, as notebooks store them; an error ends the program."""
     Shown.kept.clear()
+    Shown.source = source
     with capture_output() as captured:
         result = shell.run_cell(source)
     result.raise_error()
