@@ -5,9 +5,13 @@ import re
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 from tests.entities.robots.robots import rooms_of
 from tests.test_docs import blocks, write_titled_blocks
+from tests.viewing.browser import chromium
+from tests.viewing.test_pictures import LARGE, MEAN, SHARE
 
 import fleet2d
 from fleet2d.routines.persona import bundled_names
@@ -105,3 +109,24 @@ def test_each_picture_has_a_digest() -> None:
 def test_film_and_pictures_show_the_family_s_month_of_today() -> None:
     digests = json.loads((IMAGES / "digests.json").read_text(encoding="utf-8"))
     assert {family(30).digest} == set(digests.values()), "run python -m tools.pictures"
+
+
+@pytest.mark.slow
+def test_the_film_lasts_20_seconds_is_wide_and_looks_as_the_page_does_today() -> None:
+    with chromium():  # or the test is skipped
+        from tools import pictures
+    views = pictures.film_views(family(30))
+    chosen = range(0, len(views), 45)
+
+    drawn = pictures.pictures_of(family(30), [views[i] for i in chosen], pictures.FILM, ".plans")
+
+    with Image.open(IMAGES / "day.webp") as film:
+        assert len(views) == film.n_frames == 20 * pictures.FRAMES_PER_S
+        assert film.width >= 1000
+        for number, picture in zip(chosen, drawn, strict=True):
+            film.seek(number)
+            assert picture.size == film.size
+            small = [np.asarray(im.convert("RGB").reduce(4), int) for im in (picture, film)]
+            difference = np.abs(small[0] - small[1]).max(axis=2)
+            assert difference.mean() < MEAN, f"frame {number}: run python -m tools.pictures"
+            assert (difference > LARGE).mean() < SHARE, number

@@ -56,20 +56,24 @@ def draw_page(run: Run, path: Path) -> None:
 
 def film_page(run: Run, path: Path) -> None:
     """Write a film of the plan on the page: some scenes of a day."""
+    first, *others = pictures_of(run, film_views(run), FILM, ".plans")
+    first.save(
+        path, save_all=True, append_images=others, duration=1000 // FRAMES_PER_S, loop=0, quality=55
+    )
+
+
+def film_views(run: Run) -> list[str]:
+    """Return the view of each frame of the film."""
     midnight = run.clock.start + timedelta(days=SHOWN_DAY - 1)
     moments = []
     for begin_h, end_h, film_s in SCENES:
         frames = film_s * FRAMES_PER_S
         hours = (begin_h + (end_h - begin_h) * i / frames for i in range(frames))
         moments += [midnight + timedelta(hours=hour) for hour in hours]
-    views = [
+    return [
         f"at={moment:%Y-%m-%dT%H:%M:%S}&show=names,furniture,sight,lights,ways"
         for moment in moments
     ]
-    first, *others = pictures_of(run, views, FILM, ".plans")
-    first.save(
-        path, save_all=True, append_images=others, duration=1000 // FRAMES_PER_S, loop=0, quality=55
-    )
 
 
 def pictures_of(

@@ -187,3 +187,18 @@ def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(tmp_path: Path) -> Non
     done = process("-m", "fleet2d", "run", *words, "--out", str(tmp_path / "run"), COLUMNS="40")
 
     assert "share of time at home" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("runs/frist", "runs/first"), ("hom.yaml", "home.yaml")]
+)
+def test_what_cannot_be_viewed_names_what_is_nearest(
+    typed: str, meant: str, tmp_path: Path, fleet2d: Cli
+) -> None:
+    (tmp_path / "runs" / "first").mkdir(parents=True)
+    (tmp_path / "home.yaml").touch()
+
+    code, _, err = fleet2d("view", typed, "--no-browser")
+
+    assert 2 == code
+    assert f"there is no run directory and no scenario {typed}: did you mean {meant!r}?" in err

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fleet2d.configuration.problems import did_you_mean
 from fleet2d.errors import InputError, RunDirectoryError
 from fleet2d.options import Trust, resume_hint, show_code, split
 
@@ -48,8 +49,10 @@ def view(
         _view_runs(directories, port, seen_at or "", browser=browser, trust=trust)
         return
     scenario, overrides = split(names)
-    if scenario is not None and scenario.endswith("/"):
-        raise RunDirectoryError(f"{scenario} does not exist: give a run directory or a scenario")
+    if scenario is not None and not scenario.startswith("bundled:") and not Path(scenario).exists():
+        near = [str(path) for path in sorted(Path(scenario).parent.glob("*"))]
+        hint = did_you_mean(Path(scenario), near)
+        raise RunDirectoryError(f"there is no run directory and no scenario {scenario}{hint}")
     from fleet2d.engine.simulation import Simulation
     from fleet2d.viewing.live import LiveRun
     from fleet2d.viewing.page_server import PageServer
