@@ -128,5 +128,6 @@ def test_the_film_lasts_20_seconds_is_wide_and_looks_as_the_page_does_today() ->
             assert picture.size == film.size
             small = [np.asarray(im.convert("RGB").reduce(4), int) for im in (picture, film)]
             difference = np.abs(small[0] - small[1]).max(axis=2)
-            assert difference.mean() < MEAN, f"frame {number}: run python -m tools.pictures"
+            # WebP changes each colour a little, the more so of dark rooms.
+            assert difference.mean() < 2 * MEAN, f"frame {number}: run python -m tools.pictures"
             assert (difference > LARGE).mean() < SHARE, number
