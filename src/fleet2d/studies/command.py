@@ -143,7 +143,7 @@ def rerun(
     out: Annotated[Path | None, typer.Option(help="Store the run in this directory.")] = None,
     trust: Trust = False,
 ) -> None:
-    """Run one variant again and compare the digest and the metrics.
+    """Run one variant again and compare digest and metrics.
 
     Examples:
       fleet2d study rerun studies/speeds 12 --out variant
