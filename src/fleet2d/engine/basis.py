@@ -18,14 +18,13 @@ from pydantic import BaseModel
 
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import SightingTable
-from fleet2d.artifacts.manifest import Manifest, input_record
 from fleet2d.artifacts.store import RunStore
 from fleet2d.configuration.components import Component
 from fleet2d.configuration.importing import source_files
 from fleet2d.entities.behavior import SightEvent, Situation
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.errors import RunDirectoryError, blame
+from fleet2d.errors import blame
 from fleet2d.floorplan.home import Home
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
@@ -203,29 +202,6 @@ def input_files(scenario: Scenario) -> list[Path]:
         if not type(component).__module__.startswith("fleet2d."):
             files |= set(source_files(type(component)))
     return sorted(files)
-
-
-def changed_inputs(manifest: Manifest) -> list[str]:
-    """Return the input files of a run that have changed since.
-
-    Raises:
-        RunDirectoryError: One is missing, or is not a file.
-    """
-    changed_paths = []
-    for record in manifest.inputs:
-        path = Path(record.path)
-        try:
-            if path.exists() and not path.is_file():
-                raise RunDirectoryError(
-                    f"the run read {path}, which is not a file any more: restore it"
-                )
-            if input_record(path).sha256 != record.sha256:
-                changed_paths.append(record.path)
-        except (OSError, ValueError) as error:
-            raise RunDirectoryError(
-                f"the run read {path}, which is missing or can't be read: restore it"
-            ) from error
-    return changed_paths
 
 
 def components_of(scenario: Scenario) -> Iterator[Component]:

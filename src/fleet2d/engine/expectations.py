@@ -13,7 +13,8 @@ from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import STEP, Column, time_column
 from fleet2d.configuration.units import MICROSECOND
 from fleet2d.engine.basis import Watcher
-from fleet2d.engine.intervention_queue import InterventionQueue, possible_details, possible_events
+from fleet2d.engine.intervention_queue import InterventionQueue
+from fleet2d.engine.possible_events import possible_details, possible_events
 from fleet2d.engine.sensors import Sensors
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.errors import InputError

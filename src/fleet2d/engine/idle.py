@@ -3,8 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from fleet2d.engine.intervention_queue import is_own
-from fleet2d.entities.behavior import Actor
+from fleet2d.entities.behavior import Actor, is_own
 from fleet2d.floorplan.home import Home
 from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario

@@ -1,4 +1,4 @@
-"""Interventions in a run: when each is applied, its record in the manifest, and possible events.
+"""Interventions in a run: when each is applied, its record in the manifest.
 
 Interventions from outside are recorded with their steps, so that a run can be repeated from its
 manifest. Those of the scenario's script are recorded for readers, with their place in the script:
@@ -7,14 +7,11 @@ requests from outside, also those that still wait for a time or an event.
 """
 
 from bisect import insort
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from fleet2d.configuration.units import micros
-from fleet2d.entities.behavior import Actor
-from fleet2d.floorplan.home import Home
-from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.interventions.intervention import (
     ENTRY_KEYS,
     Intervention,
@@ -23,44 +20,13 @@ from fleet2d.interventions.intervention import (
     dump_intervention,
 )
 from fleet2d.runtime.clock import Clock
-from fleet2d.runtime.events import KINDS, Event, EventKind
+from fleet2d.runtime.events import Event
 
 # The order at one step: first the ends of interventions, then those that follow from others, then
 # those of the script and from outside.
 ENDS, FOLLOWS, SCRIPT, OUTSIDE = range(4)
 FOLLOWED = "another intervention"
 """The origin, in the manifest, of interventions that follow from others."""
-
-# Events of every person: an order can cause them if no behavior does.
-PERSON_EVENTS = frozenset(
-    {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
-)
-# Events of every robot: interventions cause them.
-ROBOT_EVENTS = frozenset(
-    {
-        EventKind.ALLOWED, EventKind.BANNED, EventKind.CALLED, EventKind.DEADLOCK,
-        EventKind.GIVES_UP, EventKind.GIVES_WAY, EventKind.LOCALIZATION_LOST, EventKind.OVERLAPS,
-        EventKind.POWER_OFF, EventKind.POWER_ON, EventKind.RELOCALIZED, EventKind.WITHDRAWS,
-    }
-)  # fmt: skip
-DOOR_EVENTS = frozenset({EventKind.OPENED, EventKind.SHUT, EventKind.LOCKED, EventKind.UNLOCKED})
-HOME_EVENTS = frozenset(
-    {EventKind.MOVED, EventKind.ROOM_CHANGED, EventKind.LIGHT_ON, EventKind.LIGHT_OFF}
-)
-SENSOR_EVENTS = frozenset({EventKind.SENSOR})
-# Events with the name of a user, or of a robot, as their detail.
-ABOUT_USERS = (
-    EventKind.USER_SEEN, EventKind.USER_LOST, EventKind.FIND_BEGINS, EventKind.FOUND,
-    EventKind.GAVE_UP, EventKind.NOT_AT_HOME, EventKind.FOLLOWS, EventKind.LOST,
-    EventKind.APPROACHES, EventKind.INTERACTS, EventKind.INTERACTION_OVER,
-)  # fmt: skip
-ABOUT_ROBOTS = (EventKind.ROBOT_SEEN, EventKind.ROBOT_LOST)
-# Events with an interaction and a person as their detail.
-OF_REQUESTS = (
-    EventKind.DUE, EventKind.EXPIRED, EventKind.ASKS, EventKind.ACCEPTED, EventKind.DECLINED,
-    EventKind.DEFERRED, EventKind.IGNORED, EventKind.MISTAKEN, EventKind.DELIVERED,
-    EventKind.BROKEN_OFF,
-)  # fmt: skip
 
 
 class DueIntervention(NamedTuple):
@@ -274,85 +240,3 @@ def read_record(content: Mapping[str, Any]) -> tuple[int, dict[str, Any]]:
 def is_from_outside(content: Mapping[str, Any]) -> bool:
     """Whether an intervention came from a caller, not from the scenario's `script`."""
     return "by" not in content
-
-
-def possible_events(
-    users: Iterable[Actor],
-    robots: Iterable[Actor],
-    home: Home,
-    doors: Sequence[str],
-    sensors: Iterable[str],
-) -> dict[str, frozenset[str]]:
-    """Return the kinds of events that can happen to each entity, by name; "" is the home."""
-    users = list(users)
-    robots = list(robots)
-    may_block = bool(doors or home.costs_version)
-    kinds: dict[str, frozenset[str]] = {"": frozenset(HOME_EVENTS)}
-    kinds |= {u.name: _kinds_of(u, PERSON_EVENTS, bool(robots), may_block) for u in users}
-    kinds |= {r.name: _kinds_of(r, ROBOT_EVENTS, bool(users), may_block) for r in robots}
-    return kinds | dict.fromkeys(doors, DOOR_EVENTS) | dict.fromkeys(sensors, SENSOR_EVENTS)
-
-
-def _kinds_of(
-    actor: Actor, always: Iterable[str], sees_somebody: bool, may_block: bool
-) -> frozenset[str]:
-    """Return the kinds of events that can happen to a body."""
-    kinds = {str(kind) for kind in always}
-    if actor.entity.eyes and sees_somebody:
-        kinds |= set(actor.entity.sight_events)
-    if getattr(actor.entity, "battery", None) is not None:
-        kinds.add(EventKind.BATTERY)
-    if may_block:
-        kinds.add(EventKind.WAY_BLOCKED)
-    if actor.requests is not None:
-        kinds |= {*REQUEST_EVENTS, EventKind.BROKEN_OFF}
-    for behavior in actor.behaviors:
-        kinds |= behavior.records
-    if is_own(actor):
-        kinds |= KINDS  # it may record any of them
-    return frozenset(kinds)
-
-
-def possible_details(
-    users: Iterable[Actor], robots: Iterable[Actor], acts: Iterable[Mapping[str, Any]]
-) -> dict[str, list[str]]:
-    """Return the details that events can have where all are known: by kind, or kind and entity.
-
-    Args:
-        users: The users.
-        robots: The robots.
-        acts: The interventions that are scheduled or done: `fleet2d.interventions` as data.
-    """
-    users = list(users)
-    robots = list(robots)
-    acts = list(acts)
-    people = [user.name for user in users]
-    names = [robot.name for robot in robots]
-    details: dict[str, list[str]] = {}
-    if not any(is_own(robot) for robot in robots):
-        details |= dict.fromkeys(ABOUT_USERS, people)
-        calls = [f"{do} {name}" for do in ("come", "find") for name in people]
-        details[EventKind.CALLED] = ["dock", *calls]
-    details |= dict.fromkeys(ABOUT_ROBOTS, names)
-    for robot in robots:
-        wanted = {} if robot.requests is None else robot.requests.interactions
-        for name, interaction in wanted.items() if not is_own(robot) else ():
-            texts = [f"{name} {person}" for person in interaction.people]
-            for kind in OF_REQUESTS:
-                key = f"{kind} {robot.name}"
-                details[key] = [*details.get(key, []), *texts]
-    for user in users:
-        # A log may hold any activities, and so may a class of the user's own.
-        if not is_own(user) and "replay" not in {b.type_name for b in user.behaviors}:
-            told = [a["what"] for a in acts if a["do"] == "activity" and a["entity"] == user.name]
-            known = [name for behavior in user.behaviors for name in behavior.activities()]
-            details[f"{EventKind.ACTIVITY} {user.name}"] = [*known, *told]
-    own = [details.get(f"{EventKind.ACTIVITY} {name}") for name in people]
-    if all(activities is not None for activities in own):
-        details[EventKind.ACTIVITY] = [name for activities in own for name in activities or ()]
-    return details
-
-
-def is_own(actor: Actor) -> bool:
-    """Whether a body has a behavior that isn't Fleet2D's."""
-    return any(not type(b).__module__.startswith("fleet2d.") for b in actor.behaviors)

@@ -13,12 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from fleet2d.artifacts.manifest import FILE_NAME, FLOORPLAN_NAME, LEARNED_NAME, SLOW, Manifest
+from fleet2d.artifacts.manifest import (
+    FILE_NAME,
+    FLOORPLAN_NAME,
+    LEARNED_NAME,
+    SLOW,
+    Manifest,
+    input_record,
+)
 from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import FOLDER, UnfinishedRun, remove_leftovers
 from fleet2d.artifacts.verification import verify_run
 from fleet2d.configuration.trust import content_of_run, stored_code
-from fleet2d.engine.basis import changed_inputs
 from fleet2d.engine.checkpoint import NO_CHECKPOINT, Checkpoint, UnusableCheckpointError
 from fleet2d.engine.expectations import TABLE
 from fleet2d.engine.intervention_queue import is_from_outside
@@ -419,3 +425,26 @@ def catch_up(simulation: Simulation, interventions: Sequence[Mapping[str, Any]])
     """Repeat the interventions that were requested after the checkpoint of the run."""
     outside = [record for record in interventions if is_from_outside(record)]
     simulation._repeat(outside[len(simulation._state.interventions.requests) :])
+
+
+def changed_inputs(manifest: Manifest) -> list[str]:
+    """Return the input files of a run that have changed since.
+
+    Raises:
+        RunDirectoryError: One is missing, or is not a file.
+    """
+    changed_paths = []
+    for record in manifest.inputs:
+        path = Path(record.path)
+        try:
+            if path.exists() and not path.is_file():
+                raise RunDirectoryError(
+                    f"the run read {path}, which is not a file any more: restore it"
+                )
+            if input_record(path).sha256 != record.sha256:
+                changed_paths.append(record.path)
+        except (OSError, ValueError) as error:
+            raise RunDirectoryError(
+                f"the run read {path}, which is missing or can't be read: restore it"
+            ) from error
+    return changed_paths

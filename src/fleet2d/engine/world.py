@@ -18,10 +18,9 @@ from fleet2d.engine.intervention_queue import (
     SCRIPT,
     DueIntervention,
     PendingIntervention,
-    possible_details,
-    possible_events,
     read_record,
 )
+from fleet2d.engine.possible_events import possible_details, possible_events
 from fleet2d.engine.sensors import Sensors
 from fleet2d.engine.state import State
 from fleet2d.entities.body import Pose

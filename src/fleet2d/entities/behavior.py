@@ -591,3 +591,8 @@ class Actor(Body):
         if heading is None:
             return Pose(x, y, Draws(self.stream("start heading"), 0).below(TURN), away)
         return Pose(x, y, round(heading / 360 * TURN) % TURN, away)
+
+
+def is_own(actor: Actor) -> bool:
+    """Whether a body has a behavior that isn't Fleet2D's."""
+    return any(not type(b).__module__.startswith("fleet2d.") for b in actor.behaviors)

@@ -1,7 +1,7 @@
 """Sources of floor plans: the base of their components, with what a scenario adds to each."""
 
 from abc import abstractmethod
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from functools import partial
@@ -10,14 +10,13 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import shapely
-from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import AfterValidator, Field
 from shapely import MultiPolygon, Polygon
 
 from fleet2d.configuration.components import Component, Settings
 from fleet2d.configuration.problems import check_known, problem, problem_at
 from fleet2d.configuration.units import (
     AngleDeg,
-    InputPath,
     Length,
     PositiveDuration,
     PositiveLength,
@@ -25,7 +24,6 @@ from fleet2d.configuration.units import (
 from fleet2d.errors import FloorPlanError, InputError
 from fleet2d.floorplan.costmap import CostmapSettings
 from fleet2d.floorplan.furniture import FURNITURE, stand_furniture
-from fleet2d.floorplan.lattice import MAX_CELL_M, MIN_CELL_M
 from fleet2d.floorplan.layers import LayerSettings, check_layers
 from fleet2d.floorplan.placed_objects import (
     MAX_HEIGHT_M,
@@ -407,40 +405,3 @@ class FloorPlanSource(Component):
         """Return the files that it reads; a run records their content, to be reproducible."""
         path = getattr(self, "path", None)
         return [] if path is None else [Path(path)]
-
-
-class PixelSource(FloorPlanSource):
-    """A source of a floor plan made of pixels; their side is the default of `cell`.
-
-    Attributes:
-        cell: Side of a grid cell, 0.01 m to 1 m; left out: the side of the map's pixels.
-    """
-
-    cell: Length | None = None  # type: ignore[assignment]
-
-    @classmethod
-    @abstractmethod
-    def usual_cell(cls, settings: Mapping[str, Any]) -> float:
-        """Return the side of a cell [m] that suits the pixels.
-
-        Args:
-            settings: The settings in the scenario; only `path` and `scale` are validated already.
-
-        Raises:
-            FloorPlanError: The file can't be read.
-            ValidationError: A setting is wrong.
-        """
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill_cell(cls, data: Any) -> Any:
-        """Fill in the cell, so that a stored scenario has it; errors are left to `load`."""
-        if not isinstance(data, Mapping) or data.get("cell") is not None or "path" not in data:
-            return data
-        try:
-            path = TypeAdapter(InputPath).validate_python(data["path"])
-            scale = TypeAdapter(float).validate_python(data.get("scale") or 1.0)
-            cell = cls.usual_cell({**data, "path": path, "scale": scale})
-            return {**data, "cell": min(max(cell, MIN_CELL_M), MAX_CELL_M)}
-        except (ValidationError, FloorPlanError):
-            return data

@@ -14,7 +14,6 @@ from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I64, Bool, pairs_in_sight
 from fleet2d.runtime.determinism import sum_in_order
-from fleet2d.runtime.events import EventKind
 
 BetterValues = Mapping[str, Literal["higher", "lower"]]
 """Which of two values is better, by the name of the number, "" for all others."""
@@ -122,32 +121,6 @@ def flat(result: Any, name: str = "") -> list[tuple[str, Any]]:
         for key, value in result.items()
         for row in flat(value, f"{name}{SEPARATOR}{key}" if name else str(key))
     ]
-
-
-class UnknownPlaces:
-    """The steps at which nobody knows where a user is, as in the gaps of a log."""
-
-    def __init__(self) -> None:
-        """Begin with all places known."""
-        self._since: dict[str, bool] = {}  # whether a place is unknown at the end of the history
-
-    def at(self, user: str, history: History, steps: I64) -> Bool:
-        """Return whether a user's place is unknown at each of some steps of a history: bool (n,).
-
-        Histories must follow each other.
-        """
-        if user not in history.log.untracked:
-            return np.zeros(len(steps), np.bool_)
-        changes = [
-            (event.step, event.event == EventKind.UNKNOWN)
-            for event in history.events
-            if event.entity == user and event.event in (EventKind.UNKNOWN, EventKind.KNOWN)
-        ]
-        begins = np.array([step for step, _ in changes], np.int64)
-        values = np.array([self._since.get(user, False), *(value for _, value in changes)])
-        self._since[user] = bool(values[-1])
-        is_unknown: Bool = values[np.searchsorted(begins, steps, side="right")]
-        return is_unknown
 
 
 class RobotUserPair(NamedTuple):

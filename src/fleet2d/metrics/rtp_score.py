@@ -16,8 +16,9 @@ from fleet2d.algorithms.presence.estimator import natural_log
 from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import F64, I64, UNKNOWN_TRUTH, Bool
-from fleet2d.metrics.metric import Metric, UnknownPlaces, columns_of
+from fleet2d.metrics.metric import Metric, columns_of
 from fleet2d.runtime.determinism import sum_in_order
+from fleet2d.runtime.events import EventKind
 
 MIN_PROBABILITY = 1e-6  # smaller probabilities are raised to this before taking logarithms
 GROUP_COUNT = 15  # number of groups of about equal size, by forecast probability
@@ -31,6 +32,32 @@ SUMMARY_SCORES = ("log_loss", "top_1", "ece", "skill", "reference_skill")  # in 
 NEVER = -1
 GapMeasures = Mapping[str, Mapping[str, Mapping[str, tuple[float, float, float]]]]
 """By measure, model and gap: a mean, and the ends of its interval, NaN if there is none."""
+
+
+class UnknownPlaces:
+    """The steps at which nobody knows where a user is, as in the gaps of a log."""
+
+    def __init__(self) -> None:
+        """Begin with all places known."""
+        self._since: dict[str, bool] = {}  # whether a place is unknown at the end of the history
+
+    def at(self, user: str, history: History, steps: I64) -> Bool:
+        """Return whether a user's place is unknown at each of some steps of a history: bool (n,).
+
+        Histories must follow each other.
+        """
+        if user not in history.log.untracked:
+            return np.zeros(len(steps), np.bool_)
+        changes = [
+            (event.step, event.event == EventKind.UNKNOWN)
+            for event in history.events
+            if event.entity == user and event.event in (EventKind.UNKNOWN, EventKind.KNOWN)
+        ]
+        begins = np.array([step for step, _ in changes], np.int64)
+        values = np.array([self._since.get(user, False), *(value for _, value in changes)])
+        self._since[user] = bool(values[-1])
+        is_unknown: Bool = values[np.searchsorted(begins, steps, side="right")]
+        return is_unknown
 
 
 def log_loss(probability: F64, truth: I64, floor: float = MIN_PROBABILITY) -> F64:

@@ -9,7 +9,7 @@ from pydantic import Field
 from fleet2d import kernels
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I32, I64, SUB, TURN, U8, Bool, Mesh, Reach
-from fleet2d.sight.fov import FieldOfView, Pieces, filled_cells
+from fleet2d.sight.fov import FieldOfView, Pieces
 
 # Memory for the poses of a flashlight; the least recently used go first.
 MEMORY_BYTES = 64e6
@@ -171,3 +171,12 @@ def _pack(mask: Bool) -> CellBits:
     box = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     height, width = box.shape
     return CellBits(int(rows[0]), int(columns[0]), height, width, np.packbits(box))
+
+
+def filled_cells(home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
+    """Return the cells in view by filling the visible region: bool (rows, columns)."""
+    lattice = home.plan.lattice
+    grid = (lattice.rows, lattice.columns)
+    mask = np.zeros(grid, np.bool_)
+    kernels.mark_spans(kernels.cells_in_view(home.walls, x, y, heading, reach, *grid), mask)
+    return mask

@@ -178,12 +178,3 @@ class LineOfSight(FieldOfView):
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:
         """Return which points have a line of sight to (x, y)."""
         return kernels.points_in_sight(home.walls, x, y, points)
-
-
-def filled_cells(home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
-    """Return the cells in view by filling the visible region: bool (rows, columns)."""
-    lattice = home.plan.lattice
-    grid = (lattice.rows, lattice.columns)
-    mask = np.zeros(grid, np.bool_)
-    kernels.mark_spans(kernels.cells_in_view(home.walls, x, y, heading, reach, *grid), mask)
-    return mask

@@ -27,7 +27,7 @@ KEY_FRAMES = "key_frames"
 NAMES = ("step", "time_us", "end_us", "user", "posture", "object", "x", "y", "heading")
 
 
-class Stays(NamedTuple):
+class PersonStays(NamedTuple):
     """The stretches of time [us since the start] that a user spends at one place [m] at home."""
 
     user: int
@@ -124,7 +124,7 @@ def posture_facts(run: Run, plan: FloorPlan) -> PostureFacts:
     )
 
 
-def _stays(run: Run) -> Iterator[Stays]:
+def _stays(run: Run) -> Iterator[PersonStays]:
     """Yield the stays of each user at home, in order."""
     if KEY_FRAMES not in run.tables:
         return
@@ -166,7 +166,7 @@ class _Keys(NamedTuple):
     away: Bool
 
 
-def _stays_of(user: int, keys: _Keys, end_us: int) -> Stays:
+def _stays_of(user: int, keys: _Keys, end_us: int) -> PersonStays:
     """Return the stays of a user; a piece of key frames holds until the next one begins."""
     begins = np.append(True, keys.is_last[:-1])
     piece = np.cumsum(begins) - 1
@@ -177,10 +177,10 @@ def _stays_of(user: int, keys: _Keys, end_us: int) -> Stays:
     begin = np.maximum(keys.time_us, since[piece])
     end = np.where(follows, np.minimum(np.roll(keys.time_us, -1), until), until)
     stays = ~moves & ~keys.away & (end > begin)
-    return Stays(user, begin[stays], end[stays], keys.places[stays])
+    return PersonStays(user, begin[stays], end[stays], keys.places[stays])
 
 
-def _rests_of(stays: Stays, rests: F64) -> tuple[I64, I64, I64, I64]:
+def _rests_of(stays: PersonStays, rests: F64) -> tuple[I64, I64, I64, I64]:
     """Return user, place to rest, begin and end of a user's stays where one sits or lies."""
     far = np.hypot(*(stays.places[:, None] - rests).transpose(2, 0, 1))
     use = far.argmin(axis=1)

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
 from fleet2d.configuration.components import Component
@@ -365,3 +364,35 @@ class SightingShare(Estimator):
         watched = sums[..., -3]
         away = np.where(watched > 0, sums[..., -2] / np.where(watched > 0, watched, 1), 0.0)
         return normalized(sums[..., :-3]), away
+
+
+def array_of(
+    learned: Mapping[str, Any],
+    name: str,
+    shape: tuple[int, ...],
+    kind: type[np.generic] = np.float64,
+    max_value: float = 1e300,
+) -> NDArray[Any]:
+    """Return a copy of an array of a learned state.
+
+    Args:
+        learned: The learned state.
+        name: Name of the array.
+        shape: The shape it must have; -1 for any length above 0.
+        kind: Type of the returned array.
+        max_value: The largest absolute value allowed.
+
+    Raises:
+        ComponentError: It is missing, of another shape, or not of finite numbers.
+    """
+    array = np.asarray(learned.get(name, ()))
+    fits = array.ndim == len(shape) and all(
+        size == expected or expected < 0 < size
+        for size, expected in zip(array.shape, shape, strict=True)
+    )
+    if not fits or array.dtype.kind not in "biuf" or not (np.abs(array) <= max_value).all():
+        raise ComponentError(
+            f"the learned state lacks a numeric array {name!r} of shape {shape}: it is damaged, or"
+            " from another home, other users or another estimator"
+        )
+    return np.array(array, kind)

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import HOURS, Presence, WeeklyPresence
-from fleet2d.algorithms.presence.estimator import Estimator, natural_log, normalized
+from fleet2d.algorithms.presence.estimator import Estimator, array_of, natural_log, normalized
 from fleet2d.configuration.problems import problem
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.errors import ComponentError

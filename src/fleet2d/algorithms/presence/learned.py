@@ -8,11 +8,10 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from fleet2d.algorithms.algorithm import array_of
 from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.belief import BeliefSeries, Presence
 from fleet2d.algorithms.presence.chain_model import ChainPresence, RoutineModel, split
-from fleet2d.algorithms.presence.estimator import natural_log
+from fleet2d.algorithms.presence.estimator import array_of, natural_log
 from fleet2d.bounds import WEIGHTS_BYTES, one_line
 from fleet2d.configuration.networks import compute, open_network
 from fleet2d.configuration.units import InputPath

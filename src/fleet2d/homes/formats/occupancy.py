@@ -14,7 +14,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.lattice import MIN_CELL_M
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.source import PixelSource
 from fleet2d.homes.formats.cleaning import (
     OccupancyMap,
     bridge_gaps,
@@ -22,6 +21,7 @@ from fleet2d.homes.formats.cleaning import (
     note_left_out,
     remove_specks,
 )
+from fleet2d.homes.formats.pixels import PixelSource
 from fleet2d.homes.formats.raster import GreyPicture
 from fleet2d.kernels import Bool, trace_rings
 

@@ -36,9 +36,9 @@ from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
-from fleet2d.floorplan.source import PixelSource
 from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
 from fleet2d.homes.formats.occupancy import outline
+from fleet2d.homes.formats.pixels import PixelSource
 from fleet2d.homes.formats.rand256 import (
     MAP_CLASS,
     MAX_PIXEL_NUMBER,

@@ -25,8 +25,8 @@ from fleet2d.homes.synthetic.slicing import (
     Slot,
     Strip,
     Tree,
+    TreeWays,
     Wall,
-    Ways,
     Wing,
     are_promising,
     gross_area,
@@ -56,14 +56,14 @@ class Service:
     """A block of garage and what is beside it.
 
     Attributes:
-        ways: Ways to divide it.
+        ways: TreeWays to divide it.
         width: Its width, where the core is high enough [units].
         whole: Whether it is as high as the core in any case.
         at_high: Whether it is flush with the core's high side, else with its low one.
         out: How far it stands out there [units].
     """
 
-    ways: Ways
+    ways: TreeWays
     width: int
     whole: bool
     at_high: bool
@@ -208,7 +208,7 @@ class Sketch:
         if not others:
             trees = [garage]
         return Service(
-            Ways(choices.shuffled(trees)),
+            TreeWays(choices.shuffled(trees)),
             choices.between(72, 130),
             self.request.outline is not None,
             choices.chance(50),
@@ -315,7 +315,7 @@ class Sketch:
     def inline(self) -> Placing:
         """Core in the middle, a wing in line with it, the service block on its other side."""
         wing = self.wing(self.private, self.add_hallway(), self.request.outline)
-        core = Ways(self.core_trees())
+        core = TreeWays(self.core_trees())
         below, above = self._offsets(self.request.outline)
         service = self.service_block()
         mouth = (0, 0, 0, wing.corridor.width)
@@ -357,7 +357,7 @@ class Sketch:
         outline = self.request.outline
         choices = self.choices
         wing = self.wing(self.private, self.add_hallway(), outline)
-        core = Ways(self.core_trees())
+        core = TreeWays(self.core_trees())
         service = self.service_block()
         at = {"L": choices.choice((0, 100)), "T": 50}.get(outline or "")
         if at is None:
@@ -393,7 +393,7 @@ class Sketch:
         halls = self.add_hallway(), self.add_hallway()
         first = self.wing([main, *others[:half]], halls[0], plain)
         second = self.wing(others[half:], halls[1], plain, is_main=False)
-        core = Ways(self.core_trees())
+        core = TreeWays(self.core_trees())
         shape = {"T": "bar", "U": "court"}.get(outline or "", outline)
         below, above = self._offsets(shape)
         as_core = choices.chance(50) if shape is None else shape in ("rectangle", "L")
@@ -426,7 +426,7 @@ class Sketch:
             column = replace(column, bays=tuple(-30 * (i == at) for i in range(len(slots))))
         elif outline is None and choices.chance(35):
             column = self._add_bays(column)
-        core = Ways(self.core_trees())
+        core = TreeWays(self.core_trees())
         service = self.service_block()
         ratio = choices.between(62, 110)
         below, above = self._offsets(outline)
@@ -455,7 +455,7 @@ class Sketch:
             blocks = service.ways.trees
             pairs = [(tree, blocks[choices.below(len(blocks))]) for tree in trees]
             trees = [Cut(True, pair if choices.chance(50) else pair[::-1]) for pair in pairs]
-        core = Ways(trees)
+        core = TreeWays(trees)
         closets = [self.closet, None]
         suites = [closet is None and choices.chance(65) for closet in closets]
         corridors = [
@@ -518,7 +518,7 @@ def _strip(groups: Sequence[RoomGroup]) -> Strip:
     return Strip(slots, (0,) * len(slots))
 
 
-def _core_width(core: Ways, areas: Areas, depth: int) -> int:
+def _core_width(core: TreeWays, areas: Areas, depth: int) -> int:
     """Return the width of a core of a depth [units].
 
     Raises:

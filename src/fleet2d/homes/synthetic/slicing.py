@@ -224,7 +224,7 @@ def tree_area(tree: Tree, areas: Areas) -> float:
     return fsum(tree_area(part, areas) for part in tree.parts)
 
 
-class Ways:
+class TreeWays:
     """Ways to divide a rectangle among the same rooms.
 
     Attributes:
