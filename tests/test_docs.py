@@ -176,7 +176,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> None:
-    """In the first minute nobody, of people simulated or real; up to a quarter of an hour some, by 0.03."""
+    """Up to a quarter of an hour nobody by more than 0.03, of people simulated or real."""
     text = text_of("paper")
     tables = [part.split("\n\n")[0] for part in re.split(r"(?=\| learned \| 0\.9)", text)[1:]]
     assert 2 == len(tables)
@@ -184,8 +184,8 @@ def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> N
         rows = {row.split("|")[1].strip(): row.split("|")[2:5] for row in table.splitlines()}
         naive = [float(cell) for cell in rows.pop("naive")]
         best = [max(float(row[i]) for row in rows.values()) for i in range(3)]
-        assert best[0] < naive[0]
-        assert all(0 < round(best[i] - naive[i], 2) <= 0.03 for i in (1, 2))
+        assert best[0] <= naive[0]
+        assert all(0 <= round(best[i] - naive[i], 2) <= 0.03 for i in (1, 2))
 
 
 def test_concepts_deny_nothing_that_there_is() -> None:

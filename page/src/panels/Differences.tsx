@@ -96,7 +96,7 @@ function countRows(runs: readonly Run[], end: number): Row[] {
   const kinds = [
     ["Requests asked", "asks"],
     ["Requests accepted", "accepted"],
-    ["Searches that found", "found"],
+    ["Searches it believes found", "found"],
     ["Ways blocked", "way_blocked"],
   ] as const;
   const seen = runs.map((run) => run.bodies.reduce((sum, { name, robot }) => (robot ? sum : sum + timeWithin(run.seen(name), 0, end)), 0));

@@ -99,5 +99,5 @@ function searchTile(run: Run): Tile | null {
   const found = run.events.ofKind("found").map((row) => row.us);
   if (searches.length === 0) return null;
   const days = daysOf(run).map((begin) => lastAtMost(found, begin + DAY_US) - lastAtMost(found, begin));
-  return { words: "Searches that found", value: String(found.length), unit: `of ${searches.length}`, days };
+  return { words: "Believed found", value: String(found.length), unit: `of ${searches.length} searches`, days };
 }
