@@ -51,25 +51,30 @@ inline SightingCounts list_sightings(View<const i64> step, View<const i32> index
     const auto [bins, users, rooms] = shape;
     auto newest = Array<i64, 2>::filled({users, rooms}, -1);  // entry
     i64 bin = -1, begin = 0;                                  // of the bin
-    for (i64 i = 0; i < step.size(); ++i) {
-        const i64 at = step[i], where = room[index[i]];
+    for (i64 i = 0, next = 0; i < step.size(); i = next) {
+        const i64 at = step[i], number = index[i];
         if (bin < 0 || at < begin || at - begin >= bin_steps) {
             bin = floor_div(at, bin_steps);
             if (bin >= bins) bin = -1;
             begin = std::max(bin, i64{0}) * bin_steps;
         }
-        if (bin < 0 || where < 0) continue;
-        for (const i64 who : {user[index[i]], users - 1}) {
+        // While nobody moves, the same sighting repeats at the next steps of the bin.
+        const auto repeats = [&](i64 k) {
+            return index[k] == number && step[k] > step[k - 1] && step[k] - begin < bin_steps;
+        };
+        next = i + 1;
+        if (bin < 0 || room[number] < 0) continue;
+        while (next < step.size() && repeats(next)) ++next;
+        for (const i64 who : {user[number], users - 1}) {
             if (who < 0) continue;
-            i64& number = newest(who, where);
-            if (number < 0 || entries[static_cast<std::size_t>(number)].bin != bin) {
-                number = static_cast<i64>(entries.size());
-                entries.push_back({who, bin, where, 0, -1});
+            i64& known = newest(who, room[number]);
+            if (known < 0 || entries[static_cast<std::size_t>(known)].bin != bin) {
+                known = static_cast<i64>(entries.size());
+                entries.push_back({who, bin, room[number], 0, -1});
             }
-            Entry& entry = entries[static_cast<std::size_t>(number)];
-            if (entry.last == at) continue;
-            entry.last = at;
-            ++entry.steps;
+            Entry& entry = entries[static_cast<std::size_t>(known)];
+            entry.steps += next - i - (entry.last == at ? 1 : 0);
+            entry.last = step[next - 1];
         }
     }
     std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
