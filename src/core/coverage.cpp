@@ -210,18 +210,18 @@ void CoverageRecorder::add_held(i64 bin) {
     const i64 steps = looks_ * setup_.every, first = cache_.shown(slot_, 0), end = cache_.shown(slot_, 1);
     if (first < 0 || end > record_.patches()) throw std::invalid_argument("shown must hold ranges of patches");
     const View<i32> cells = cache_.cells[slot_];
-    if (!record_.keeps_bins()) {
-        for (i64 patch = first; patch < end; ++patch) record_.exposure[patch] += steps * cells[patch];
-        return;
-    }
-    if (steps == 0) return;
+    const auto add_to = [&](View<i64> sums) {
+        if (steps == 1) {  // a robot that walks
+            for (i64 patch = first; patch < end; ++patch) sums[patch] += cells[patch];
+        } else {
+            for (i64 patch = first; patch < end; ++patch) sums[patch] += steps * cells[patch];
+        }
+    };
+    add_to(record_.exposure);
+    if (!record_.keeps_bins() || steps == 0) return;
     if (begun_ <= bin) leave_empty(bin + 1);
-    const View<i64> binned = record_.binned[bin], peak = record_.peak[bin];
-    if (steps == 1) {  // a robot that walks
-        for (i64 patch = first; patch < end; ++patch) binned[patch] += cells[patch];
-    } else {
-        for (i64 patch = first; patch < end; ++patch) binned[patch] += steps * cells[patch];
-    }
+    const View<i64> peak = record_.peak[bin];
+    add_to(record_.binned[bin]);
     for (i64 patch = first; patch < end; ++patch) peak[patch] = std::max(peak[patch], i64{cells[patch]});
 }
 
@@ -269,12 +269,7 @@ void CoverageRecorder::record(const Window& window, i64 body, i64 first, i64 end
     }
     add_held(bin);
     if (!bins || first == end) return;
-    const i64 reached = floor_div(end - 1, bin_steps) - first_bin + 1;
-    leave_empty(reached);
-    for (i64 row = 0; row < reached; ++row) {
-        const View<i64> binned = record_.binned[row];
-        for (i64 patch = 0; patch < record_.patches(); ++patch) record_.exposure[patch] += binned[patch];
-    }
+    leave_empty(floor_div(end - 1, bin_steps) - first_bin + 1);
 }
 
 }  // namespace

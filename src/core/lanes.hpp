@@ -19,10 +19,15 @@ inline int widest() {
 }
 
 // Do work on W people with the instructions for as many; all that it calls is inlined for that.
+template <class Work>
+__attribute__((target("avx2"), flatten)) void alone_with_avx2(Work work) {
+    work();
+}
 template <int W, class Work>
     requires(W == 1)
 void side_by_side(Work work) {
-    work();
+    // Of one person, several patches are computed at once.
+    widest() > 1 ? alone_with_avx2(work) : work();
 }
 template <int W, class Work>
     requires(W == 4)
