@@ -2,13 +2,13 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import TypeVar, overload
+from typing import Any, TypeVar, overload
 
 Item = TypeVar("Item", covariant=True)
 
 
 class LazySequence(Sequence[Item]):
-    """Base of sequences that make each item anew; a slice is a list of items."""
+    """Base of sequences that keep only the item asked for last; a slice is a list of items."""
 
     @abstractmethod
     def item(self, index: int) -> Item:
@@ -22,4 +22,12 @@ class LazySequence(Sequence[Item]):
         """Return an item, or those of a slice."""
         if isinstance(index, slice):
             return [self.item(i) for i in range(*index.indices(len(self)))]
-        return self.item(index)
+        last, item = self.__dict__.get("_last", (None, None))
+        if last != index:
+            item = self.item(index)
+            self.__dict__["_last"] = index, item  # also of those that are frozen
+        return item
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the item that is kept."""
+        return {name: value for name, value in self.__dict__.items() if name != "_last"}

@@ -337,13 +337,13 @@ class ScenarioFile:
         directory.storage.write_table(SCENARIOS, self._parts())
 
     def _parts(self) -> "Iterator[pa.Table]":
-        import pyarrow as pa
+        import polars as pl  # Arrow would import pandas to look at lists
 
         self._texts.seek(0)
         for first in range(0, len(self._templates), SCENARIO_ROWS):
             templates = self._templates[first : first + SCENARIO_ROWS]
             texts = [self._next_text() for _ in templates]
-            yield pa.table({"template": templates, "scenario": texts})
+            yield pl.DataFrame({"template": templates, "scenario": texts}).to_arrow()
 
     def _next_text(self) -> str:
         size = int.from_bytes(self._texts.read(4))

@@ -264,6 +264,7 @@ class LifeFinder:
         self._on_progress = on_progress
         self._facts: dict[str, HomeFeatures] = {}
         self._unbuilt = set[str]()
+        self._found: dict[int, HomeFeatures] = {}  # the facts of the homes of lives
         if draw.asks_homes:
             listed = draw.homes.listed
             changes = [draw.homes[place].changes for place in listed]
@@ -272,7 +273,7 @@ class LifeFinder:
 
     def facts_of(self, number: int) -> HomeFeatures:
         """Return the facts of the home of a life that was found."""
-        return self._facts[repr(_home_changes(self._draw.life(number)))]
+        return self._found[number]
 
     def find(self, count: int, *, needs_facts: bool) -> list[int]:
         """Return the numbers of the first lives that meet the conditions.
@@ -295,7 +296,8 @@ class LifeFinder:
                 changes = [_home_changes(life) for life in lives]
                 self._build(changes, [f"life {life.number} ({life.home.words})" for life in lives])
                 homes = [self._facts.get(repr(change)) for change in changes]
-                pairs = zip(lives, homes, strict=True)
+                pairs = list(zip(lives, homes, strict=True))
+                self._found |= {life.number: facts for life, facts in pairs if facts is not None}
                 lives = [life for life, facts in pairs if not self._is_left_out(life, facts)]
             kept += [life.number for life in lives]
         return kept
