@@ -46,6 +46,18 @@ def table(folder: Path, text: str) -> str:
     return str(path)
 
 
+def test_a_life_is_drawn_once_for_its_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+    lives = design()
+    drawn: list[int] = []
+    draw_life = Draw.life
+    monkeypatch.setattr(Draw, "life", lambda self, n: drawn.append(n) or draw_life(self, n))
+
+    lives.scenario(1)
+
+    # Its labels and its changes are two sequences.
+    assert len(drawn) <= 2
+
+
 def test_each_life_has_its_home_its_people_and_its_seed_in_all_settings(tmp_path: Path) -> None:
     study = fleet()
     study["axes"]["robots.astro.speed"] = [0.3, 0.6]

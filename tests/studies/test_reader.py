@@ -51,6 +51,17 @@ def test_opening_loads_neither_the_simulator_nor_pandas(study: Study) -> None:
     assert "[]\n" == done.stdout
 
 
+def test_running_does_not_load_pandas(tmp_path: Path) -> None:
+    code = (
+        "import sys, fleet2d\n"
+        "base = {'extends': 'bundled:paper', 'simulation': {'duration': '1 min'}}\n"
+        f"fleet2d.study({{'base': base}}, {str(tmp_path / 'study')!r}, workers=1)\n"
+        "print('pandas' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "False\n" == done.stdout
+
+
 def test_a_table_of_all_variants_comes_with_their_parameters(study: Study) -> None:
     rows = study.polars("room_share").collect()
     assert {"variant", "step", "time", "user", "room", SPEED, "seed"} <= set(rows.columns)
