@@ -14,10 +14,10 @@ import pytest
 from tests.hostile.test_folders import attack, state_of
 from tests.learning.datasets.small import make
 
-import fleet2d
 from fleet2d.learning.datasets.reader import open_dataset
 from fleet2d.learning.datasets.tables import SCHEMAS
 from fleet2d.learning.datasets.tasks import leaderboard, windows
+from fleet2d.studies.design import code_version
 
 MANIFEST = "dataset.json"
 
@@ -300,7 +300,7 @@ def test_a_forged_record_or_part_of_an_unfinished_one_is_made_again_or_refused(
     (copy / MANIFEST).unlink()
     parts = copy / "unfinished"
     parts.mkdir()
-    (parts / "plan.txt").write_text(f"{data.manifest.plan} {fleet2d.__version__}")
+    (parts / "plan.txt").write_text(f"{data.manifest.plan} {code_version()}")
     (parts / "train-00000.json").write_text('{"../secret": {"bytes": 0}}')
     with pa.OSFile(str(parts / "000000.arrow"), "wb") as file:
         for _ in SCHEMAS:

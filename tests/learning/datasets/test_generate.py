@@ -22,6 +22,7 @@ from fleet2d.errors import Fleet2DError, InputError, ScenarioError
 from fleet2d.learning.datasets.generate import _bars
 from fleet2d.learning.datasets.reader import Dataset
 from fleet2d.learning.datasets.tasks import windows
+from fleet2d.studies.design import code_version
 
 
 def records(data: Dataset) -> dict[str, str]:
@@ -95,7 +96,7 @@ def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
     shutil.copytree(data.root, out)
     (out / "dataset.json").unlink()
     parts.mkdir()
-    (parts / "plan.txt").write_text(f"{data.manifest.plan} {fleet2d.__version__}")
+    (parts / "plan.txt").write_text(f"{data.manifest.plan} {code_version()}")
     (parts / "unfit").write_text("{}")
     files = data.manifest.files
     whole = {
