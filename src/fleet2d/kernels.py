@@ -147,9 +147,8 @@ class GroupRule(NamedTuple):
 class Divisions(NamedTuple):
     """Trees by which rectangles are cut into rooms; their nodes stand in preorder."""
 
-    nodes: (
-        I64  # (nodes, 2) room and percent of its area; of a cut -1 (along y) or -2, and its parts
-    )
+    # (nodes, 2): a room and the percent of its area, or of a cut -1 (along y) or -2, and its parts
+    nodes: I64
     starts: I64  # (trees,) the first node of each tree
 
 

@@ -234,6 +234,15 @@ def test_what_is_left_out_is_noted_and_stored(tmp_path: Path) -> None:
     assert "people is not 2" in study.meta.notes
 
 
+def test_a_cell_longer_than_a_name_of_a_file_is_no_file(tmp_path: Path) -> None:
+    """Data sets looked whether cells of key paths name files, and ended in a traceback."""
+    log = tmp_path / "log.csv"
+    log.write_text("")
+    census = table(tmp_path, f"users.ana.path,robots.astro.note\n{log},{'x' * 300}\n")
+
+    assert [Path(census), log] == draw(table=census).files
+
+
 def test_a_column_that_is_almost_another_one_is_noted(tmp_path: Path) -> None:
     """A column `wieght` labelled lives, which all were drawn with equal chances."""
     census = table(tmp_path, "household,wieght,age,robots.astro.speed\nretired,1,70,0.3\n")

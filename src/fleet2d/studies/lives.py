@@ -225,7 +225,7 @@ class Draw:
         """The table, and the files that it names, such as logs."""
         table = self._settings.table
         named = {str(v) for row in self._rows for key, v in row.items() if "." in key}
-        return [] if table is None else [table, *filter(Path.is_file, map(Path, sorted(named)))]
+        return [] if table is None else [table, *filter(_is_file, map(Path, sorted(named)))]
 
     @property
     def notes(self) -> list[str]:
@@ -450,9 +450,17 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
         )
     for row in rows:
         for key, value in row.items():
-            if isinstance(value, str) and "." in key and (path.parent / value).is_file():
+            if isinstance(value, str) and "." in key and _is_file(path.parent / value):
                 row[key] = str((path.parent / value).absolute())  # such as a log
     return rows, ends, frame.columns
+
+
+def _is_file(path: Path) -> bool:
+    """Return whether there is such a file; a text that is too long for a name is none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def feature_labels(household: Any, facts: HomeFeatures) -> dict[str, Label]:

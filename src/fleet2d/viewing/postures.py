@@ -185,7 +185,9 @@ def _rests_of(stays: PersonStays, rests: F64) -> tuple[I64, I64, I64, I64]:
     far = np.hypot(*(stays.places[:, None] - rests).transpose(2, 0, 1))
     use = far.argmin(axis=1)
     near = far.min(axis=1) < USED_WITHIN_M
-    use, begin, end = use[near], stays.begin_us[near], stays.end_us[near]
+    use = use[near]
+    begin = stays.begin_us[near]
+    end = stays.end_us[near]
     # Who turns around on furniture stays on it.
     begins = np.append(True, (begin[1:] != end[:-1]) | (use[1:] != use[:-1]))[: len(use)]
     ends = np.append(begins[1:], True)[: len(use)]

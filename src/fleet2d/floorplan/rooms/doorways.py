@@ -203,7 +203,8 @@ def _jamb(polygon: Polygon, start: F64, end: F64, far: F64) -> tuple[int, int] |
     A way that passes beside the corner at `end`, as along a slanted wall, ends there.
     """
     corners, ring_of = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
-    begins, ends = corners[:-1], corners[1:]
+    begins = corners[:-1]
+    ends = corners[1:]
     least, most = np.minimum(start, far), np.maximum(start, far)
     is_near = ((np.minimum(begins, ends) <= most) & (np.maximum(begins, ends) >= least)).all(axis=1)
     is_near &= ring_of[:-1] == ring_of[1:]

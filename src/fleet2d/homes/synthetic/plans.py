@@ -56,7 +56,7 @@ class Service:
     """A block of garage and what is beside it.
 
     Attributes:
-        ways: TreeWays to divide it.
+        ways: Ways to divide it.
         width: Its width, where the core is high enough [units].
         whole: Whether it is as high as the core in any case.
         at_high: Whether it is flush with the core's high side, else with its low one.
