@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "lanes.hpp"
 #include "visible_cells.hpp"
 
 namespace fleet2d {
@@ -30,8 +31,8 @@ i64 panned_at(const Lenses& lenses, i64 moment_us) {
     return static_cast<i64>(number);
 }
 
-// The slot that holds a pose, or the empty one that it would go to.
-i64 slot_of(const PoseCache& cache, const Stance& stance) {
+// The slot that holds the number of a pose, or the empty one that it would go to.
+i32& slot_of(const PoseCache& cache, const Stance& stance) {
     u64 hash = static_cast<u64>(stance.x) * 0x9E3779B97F4A7C15;
     hash ^= static_cast<u64>(stance.y) * 0xC2B2AE3D27D4EB4F;
     hash ^= static_cast<u64>(stance.panned) * TURN + static_cast<u64>(stance.heading);
@@ -39,9 +40,11 @@ i64 slot_of(const PoseCache& cache, const Stance& stance) {
     const i64 mask = cache.slots() - 1;
     i64 slot = static_cast<i64>(hash >> 33) & mask;
     for (i64 tried = 0; tried <= mask; ++tried, slot = (slot + 1) & mask) {
-        if (cache.last[slot] == NEVER) return slot;
-        const View<i64> pose = cache.pose[slot];
-        if (Stance{pose[0], pose[1], pose[2], pose[3]} == stance) return slot;
+        i32& number = cache.number[slot];
+        if (number == NEVER) return number;
+        if (number < 0 || number >= cache.used[0]) break;
+        const View<i64> pose = cache.pose[number];
+        if (Stance{pose[0], pose[1], pose[2], pose[3]} == stance) return number;
     }
     throw std::invalid_argument("more slots of cache are used than `used` says");
 }
@@ -106,13 +109,13 @@ private:
 };
 
 void settle_coverage(const CoverageSetup& setup, const PoseCache& cache, View<i64, 2> seen, CameraCells& cells) {
-    for (i64 slot = 0; slot < cache.slots(); ++slot) {
-        const i64 step = cache.last[slot];
-        if (step == cache.settled[slot]) continue;
+    for (i64 number = 0; number < cache.used[0]; ++number) {
+        const i64 step = cache.last[number];
+        if (step == cache.settled[number]) continue;
         if (step < 0 || step > LAST_MOMENT / setup.step_us) throw std::invalid_argument("last must hold steps, or -1");
-        cache.settled[slot] = step;
+        cache.settled[number] = step;
         for (i64 camera = 0; camera < setup.cameras(); ++camera) {
-            for (const Span& span : cells.of(camera, cache.pose[slot], step)) {
+            for (const Span& span : cells.of(camera, cache.pose[number], step)) {
                 for (i64& last : cells_of(seen, span)) last = std::max(last, step);
             }
         }
@@ -132,11 +135,14 @@ private:
     void take(const Stance& stance, i64 step);
 
     // Look from a new pose: mark what was never seen before, and count the cells of each patch.
-    void look_from(i64 slot, i64 step);
+    void look_from(i64 number, i64 step);
     void mark(const Span& span, i64 step, View<i32> cells);
 
     // Add the view of the held pose for the looks not added yet; `bin` is a row of CoverageRecord::binned.
     void add_held(i64 bin);
+
+    // Add cells of patches to their sums, and keep the most of them; the arrays don't overlap.
+    static void add_view(i64 patches, const i32* cells, i64 steps, i64* exposure, i64* binned, i64* peak);
 
     // Set the bins before `bin` that nothing was added to.
     void leave_empty(i64 bin);
@@ -147,39 +153,43 @@ private:
     CameraCells cells_;
     RunEnds run_ends_;
     Stance held_{};
-    i64 slot_ = -1;  // of the held pose; -1 for none
-    i64 looks_ = 0;  // that aren't added yet
+    i64 number_ = -1;  // of the held pose; -1 for none
+    i64 looks_ = 0;    // that aren't added yet
     i64 last_look_ = NEVER;
     i64 begun_ = 0;  // bins that are set
 };
 
 void CoverageRecorder::take(const Stance& stance, i64 step) {
-    if (2 * cache_.used[0] >= cache_.slots()) {
+    if (cache_.used[0] >= cache_.poses()) {
         if (record_.keeps_last()) settle_coverage(setup_, cache_, record_.last, cells_);
-        std::fill(cache_.last.begin(), cache_.last.end(), NEVER);
-        std::fill(cache_.settled.begin(), cache_.settled.end(), NEVER);
+        std::fill(cache_.number.begin(), cache_.number.end(), static_cast<i32>(NEVER));
         cache_.used[0] = 0;
     }
     held_ = stance;
-    slot_ = slot_of(cache_, stance);
-    if (cache_.last[slot_] != NEVER) return;
-    const View<i64> pose = cache_.pose[slot_];
+    i32& number = slot_of(cache_, stance);
+    if (number != NEVER) {
+        number_ = number;
+        return;
+    }
+    number_ = cache_.used[0];
+    const View<i64> pose = cache_.pose[number_];
     pose[0] = stance.x, pose[1] = stance.y, pose[2] = stance.heading, pose[3] = stance.panned;
-    look_from(slot_, step);
-    cache_.last[slot_] = cache_.settled[slot_] = step;
+    look_from(number_, step);
+    cache_.last[number_] = cache_.settled[number_] = step;
+    number = static_cast<i32>(number_);
     ++cache_.used[0];
 }
 
-void CoverageRecorder::look_from(i64 slot, i64 step) {
-    const View<i32> cells = cache_.cells[slot];
+void CoverageRecorder::look_from(i64 number, i64 step) {
+    const View<i32> cells = cache_.cells[number];
     std::fill(cells.begin(), cells.end(), 0);
     for (i64 camera = 0; camera < setup_.cameras(); ++camera) {
-        for (const Span& span : cells_.of(camera, cache_.pose[slot], step)) mark(span, step, cells);
+        for (const Span& span : cells_.of(camera, cache_.pose[number], step)) mark(span, step, cells);
     }
     i64 first = 0, end = cells.size();
     while (first < end && cells[first] == 0) ++first;
     while (end > first && cells[end - 1] == 0) --end;
-    cache_.shown(slot, 0) = static_cast<i32>(first), cache_.shown(slot, 1) = static_cast<i32>(end);
+    cache_.shown(number, 0) = static_cast<i32>(first), cache_.shown(number, 1) = static_cast<i32>(end);
 }
 
 void CoverageRecorder::mark(const Span& span, i64 step, View<i32> cells) {
@@ -205,24 +215,40 @@ void CoverageRecorder::mark(const Span& span, i64 step, View<i32> cells) {
 }
 
 void CoverageRecorder::add_held(i64 bin) {
-    if (slot_ < 0) return;
-    cache_.last[slot_] = last_look_;
-    const i64 steps = looks_ * setup_.every, first = cache_.shown(slot_, 0), end = cache_.shown(slot_, 1);
+    if (number_ < 0) return;
+    cache_.last[number_] = last_look_;
+    const i64 steps = looks_ * setup_.every, first = cache_.shown(number_, 0), end = cache_.shown(number_, 1);
     if (first < 0 || end > record_.patches()) throw std::invalid_argument("shown must hold ranges of patches");
-    const View<i32> cells = cache_.cells[slot_];
-    const auto add_to = [&](View<i64> sums) {
-        if (steps == 1) {  // a robot that walks
-            for (i64 patch = first; patch < end; ++patch) sums[patch] += cells[patch];
-        } else {
-            for (i64 patch = first; patch < end; ++patch) sums[patch] += steps * cells[patch];
-        }
-    };
-    add_to(record_.exposure);
-    if (!record_.keeps_bins() || steps == 0) return;
+    const i32* cells = cache_.cells[number_].data + first;
+    if (!record_.keeps_bins()) {
+        for (i64 i = 0; i < end - first; ++i) record_.exposure[first + i] += steps * cells[i];
+        return;
+    }
+    if (steps == 0) return;
     if (begun_ <= bin) leave_empty(bin + 1);
-    const View<i64> peak = record_.peak[bin];
-    add_to(record_.binned[bin]);
-    for (i64 patch = first; patch < end; ++patch) peak[patch] = std::max(peak[patch], i64{cells[patch]});
+    side_by_side<1>([&] {
+        add_view(end - first, cells, steps, record_.exposure.data + first, record_.binned[bin].data + first,
+                 record_.peak[bin].data + first);
+    });
+}
+
+void CoverageRecorder::add_view(i64 patches, const i32* __restrict cells, i64 steps, i64* __restrict exposure,
+                                i64* __restrict binned, i64* __restrict peak) {
+    if (steps == 1) {  // a robot that walks
+        for (i64 i = 0; i < patches; ++i) {
+            const i64 count = cells[i];
+            exposure[i] += count;
+            binned[i] += count;
+            peak[i] = std::max(peak[i], count);
+        }
+        return;
+    }
+    for (i64 i = 0; i < patches; ++i) {
+        const i64 count = cells[i];
+        exposure[i] += steps * count;
+        binned[i] += steps * count;
+        peak[i] = std::max(peak[i], count);
+    }
 }
 
 void CoverageRecorder::leave_empty(i64 bin) {
@@ -237,16 +263,17 @@ void CoverageRecorder::record(const Window& window, i64 body, i64 first, i64 end
     const bool bins = record_.keeps_bins();
     const bool pans = std::any_of(setup_.lenses.pan_count.begin(), setup_.lenses.pan_count.end(),
                                   [](i64 headings) { return headings > 0; });
+    const auto next_look = [every](i64 step) { return every == 1 ? step : next_multiple(step, every); };
     const i64 first_bin = floor_div(first, bin_steps);
     i64 bin = 0, next_bin = (first_bin + 1) * bin_steps;
     for (i64 run = window.start[body]; run < window.start[body + 1]; ++run) {
         const i64 begin = std::max(first, window.step[run]), stop = std::min(end, window.run_end(body, run));
         if (window.away[run] != 0) {
             add_held(bin);
-            slot_ = -1, looks_ = 0;
+            number_ = -1, looks_ = 0;
             continue;
         }
-        for (i64 step = next_multiple(begin, every); step < stop;) {
+        for (i64 step = next_look(begin); step < stop;) {
             if (bins && step >= next_bin) {
                 add_held(bin);
                 looks_ = 0;
@@ -255,14 +282,14 @@ void CoverageRecorder::record(const Window& window, i64 body, i64 first, i64 end
             }
             const i64 panned = pans ? panned_at(setup_.lenses, step * setup_.step_us) : 0;
             const Stance stance{window.x[run], window.y[run], window.heading[run], panned};
-            if (slot_ < 0 || stance != held_) {
+            if (number_ < 0 || stance != held_) {
                 add_held(bin);
                 looks_ = 0;
                 take(stance, step);
             }
             const i64 until = pans ? step + 1 : bins ? std::min(stop, next_bin) : stop;
-            const i64 next = next_multiple(until, every);
-            looks_ += (next - step) / every;
+            const i64 next = next_look(until);
+            looks_ += every == 1 ? next - step : (next - step) / every;
             last_look_ = next - every;
             step = next;
         }

@@ -13,16 +13,19 @@ namespace fleet2d {
 inline constexpr i64 NEVER = -1;
 inline constexpr i64 LAST_MOMENT = i64{1} << 62;  // us: no step begins later
 
-// The cached poses, in an open hash table whose length is a power of two, at most half full.
+// The cached poses, one after the other as the robot came to them: its ways pass the same ones, which are then near
+// each other in memory. An open hash table, whose length is a power of two, has twice as many slots.
 struct PoseCache {
-    View<i64, 2> pose;   // (slots, 4) x, y [lattice units], heading, and how far the cameras are panned
-    View<i64> last;      // (slots,) the last step with the pose; NEVER for an empty slot
-    View<i64> settled;   // (slots,) the last such step that is in CoverageRecord::last
-    View<i32, 2> cells;  // (slots, patches) cells of each patch in view
-    View<i32, 2> shown;  // (slots, 2) the first patch in view, and one past the last
-    View<i64> used;      // (1,) number of used slots
+    View<i32> number;    // (slots,) the number of the pose in each slot; NEVER for an empty slot
+    View<i64, 2> pose;   // (poses, 4) x, y [lattice units], heading, and how far the cameras are panned
+    View<i64> last;      // (poses,) the last step with the pose
+    View<i64> settled;   // (poses,) the last such step that is in CoverageRecord::last
+    View<i32, 2> cells;  // (poses, patches) cells of each patch in view
+    View<i32, 2> shown;  // (poses, 2) the first patch in view, and one past the last
+    View<i64> used;      // (1,) number of poses that are cached
 
-    i64 slots() const { return last.size(); }
+    i64 slots() const { return number.size(); }
+    i64 poses() const { return last.size(); }
 };
 
 // What a robot has seen since the start. A patch is a room, or a part of one.
@@ -54,7 +57,7 @@ struct CoverageSetup {
 };
 
 // Record what a robot, which is a body of a window, sees in the steps first to end - 1. The cache is emptied when it
-// is half full. `record.last` isn't updated for poses in the cache: see `settle_coverage`.
+// is full. `record.last` isn't updated for poses in the cache: see `settle_coverage`.
 void record_coverage(const CoverageSetup& setup, const Window& window, i64 body, i64 first, i64 end,
                      const PoseCache& cache, const CoverageRecord& record);
 

@@ -343,17 +343,19 @@ class ShownMemory(NamedTuple):
 
 
 class PoseCache(NamedTuple):
-    """What cameras see at each pose: an open hash table of 2**n slots, at most half full.
+    """What cameras see at each pose: poses in order, and an open hash table of 2**n slots.
 
     Attributes:
-        pose: int64 (slots, 4), x, y [lattice units], heading, and pan position of the cameras.
-        last: int64 (slots,), last step with the pose, -1 for an empty slot.
-        settled: int64 (slots,), the last of these steps that `CoverageRecord.last` has counted.
-        cells: int32 (slots, patches), number of cells of each patch in view.
-        shown: int32 (slots, 2), the first patch in view, and one past the last.
-        used: int64 (1,), number of used slots.
+        number: int32 (slots,), number of the pose in each slot, -1 for an empty slot.
+        pose: int64 (poses, 4), x, y [lattice units], heading, and pan position of the cameras.
+        last: int64 (poses,), last step with the pose.
+        settled: int64 (poses,), the last of these steps that `CoverageRecord.last` has counted.
+        cells: int32 (poses, patches), number of cells of each patch in view.
+        shown: int32 (poses, 2), the first patch in view, and one past the last.
+        used: int64 (1,), number of poses that are cached.
     """
 
+    number: I32
     pose: I64
     last: I64
     settled: I64
@@ -409,13 +411,15 @@ class CoverageSetup(NamedTuple):
 
 
 def empty_pose_cache(slots: int, patches: int) -> PoseCache:
-    """Return an empty cache; `slots` is a power of two, each of 56 bytes and 4 per patch."""
+    """Return an empty cache for half as many poses as slots, which are a power of two."""
+    poses = slots // 2
     return PoseCache(
-        pose=np.zeros((slots, 4), np.int64),
-        last=np.full(slots, NEVER, np.int64),
-        settled=np.full(slots, NEVER, np.int64),
-        cells=np.zeros((slots, patches), np.int32),
-        shown=np.zeros((slots, 2), np.int32),
+        number=np.full(slots, NEVER, np.int32),
+        pose=np.zeros((poses, 4), np.int64),
+        last=np.zeros(poses, np.int64),
+        settled=np.zeros(poses, np.int64),
+        cells=np.zeros((poses, patches), np.int32),
+        shown=np.zeros((poses, 2), np.int32),
         used=np.zeros(1, np.int64),
     )
 

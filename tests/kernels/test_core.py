@@ -1027,8 +1027,8 @@ def test_named_tuples_of_another_length_are_refused(name: str, places: list[Path
 
 WRITTEN = {
     "mark_spans": [(1,)],
-    "record_coverage": [*((5, i) for i in range(6)), *((6, i) for i in range(6))],
-    "settle_coverage": [*((1, i) for i in range(6)), (2,)],
+    "record_coverage": [*((5, i) for i in range(7)), *((6, i) for i in range(6))],
+    "settle_coverage": [*((1, i) for i in range(7)), (2,)],
     "trace_track": [(3, i) for i in range(4)],
     "remember": [(6, i) for i in range(3)],
     "show_memory": [*((0, i) for i in range(3)), (7,)],

@@ -235,7 +235,7 @@ def test_tables_that_do_not_fit_are_refused() -> None:
     far = window_of(Poses(*[np.full(3, 2**41)] * 3, np.zeros(3, np.uint8)))
     cache = empty_pose_cache(8, ROOMS)
     full = empty_pose_cache(8, ROOMS)
-    full.last[:] = 0
+    full.number[:] = 0
     bins = record._replace(
         binned=np.zeros((2, ROOMS), np.int64), peak=np.zeros((2, ROOMS), np.int64)
     )
@@ -245,6 +245,7 @@ def test_tables_that_do_not_fit_are_refused() -> None:
         ((setup, *steps, empty_pose_cache(6, ROOMS), record), "a power of two"),
         ((setup, *steps, empty_pose_cache(8, 2), record), "cells must be"),
         ((setup, *steps, full, record), "more slots of cache"),
+        ((setup, *steps, cache._replace(number=cache.number[:4]), record), "twice as many slots"),
         ((setup._replace(patch_of_cell=rooms + np.int16(9)), *steps, cache, record), "patches"),
         ((setup._replace(patch_of_cell=rooms[1:]), *steps, cache, record), "patch_of_cell"),
         ((setup._replace(every=0), *steps, cache, record), "every"),

@@ -9,7 +9,7 @@
 namespace fleet2d {
 
 template <>
-inline constexpr std::size_t border::members_of<PoseCache> = 6;
+inline constexpr std::size_t border::members_of<PoseCache> = 7;
 
 template <>
 inline constexpr std::size_t border::members_of<CoverageRecord> = 6;
@@ -33,14 +33,14 @@ void check_watched(const CoverageSetup& setup) {
 }
 
 void check_glances(const PoseCache& cache) {
-    const i64 slots = cache.slots();
+    const i64 slots = cache.slots(), poses = cache.poses();
     require(slots > 0 && (slots & (slots - 1)) == 0, "cache must have a power of two of slots");
-    require(
-        cache.pose.size() == slots && cache.pose.shape[1] == 4 && cache.settled.size() == slots &&
-            cache.cells.size() == slots && cache.shown.size() == slots && cache.shown.shape[1] == 2 &&
-            cache.used.size() == 1,
-        "all arrays of cache must have one length, that of the slots; pose (slots, 4), shown (slots, 2), used (1,)");
-    require(0 <= cache.used[0] && cache.used[0] <= slots, "used must be the number of slots that are");
+    require(0 < poses && 2 * poses <= slots, "cache must have at least twice as many slots as poses");
+    require(cache.pose.size() == poses && cache.pose.shape[1] == 4 && cache.settled.size() == poses &&
+                cache.cells.size() == poses && cache.shown.size() == poses && cache.shown.shape[1] == 2 &&
+                cache.used.size() == 1,
+            "all arrays of cache but number must have one length; pose (poses, 4), shown (poses, 2), used (1,)");
+    require(0 <= cache.used[0] && cache.used[0] <= poses, "used must be the number of poses that are");
 }
 
 bool is_grid(View<i64, 2> cells, const CoverageSetup& setup) { return cells.shape == setup.patch_of_cell.shape; }
@@ -78,7 +78,7 @@ void bind_coverage(nb::module_& m) {
             check_watched(setup);
             check_glances(cache);
             check_record(setup, record);
-            require(cache.cells.shape[1] == record.patches(), "cells must be (slots, patches)");
+            require(cache.cells.shape[1] == record.patches(), "cells must be (poses, patches)");
             check_steps(setup, window, body, first, end, record);
             record_coverage(setup, window, body, first, end, cache, record);
         },
@@ -91,7 +91,7 @@ Args:
     body: Number of the robot among the bodies.
     first: The first step.
     end: One past the last step.
-    cache: The cached poses; emptied when the table is half full.
+    cache: The cached poses; emptied when it is full.
     record: What it has seen; `last` isn't updated for poses in the cache: see `settle_coverage`.)");
     m.def(
         "settle_coverage",

@@ -103,7 +103,7 @@ class SeenArea(Watcher):
         of_cell = self._patches.of_cell
         bin_steps = max(self._bin_steps, 1)
         self._setup = CoverageSetup(walls, self._lenses, of_cell, step_us, self.every, bin_steps)
-        self._cache.last[:] = self._cache.settled[:] = NEVER
+        self._cache.number[:] = NEVER
         self._cache.used[0] = 0
 
     def darken(self, cameras: Collection[str]) -> None:
