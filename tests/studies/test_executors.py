@@ -1,17 +1,21 @@
 """Tasks on executors: those of a home go together, and those of dead workers are run again."""
 
+import gc
 import itertools
 import os
+import platform
 import signal
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.studies.scenes import CountingExecutor
 
 from fleet2d.errors import ComponentError, InputError
+from fleet2d.runtime.memory import OBJECTS
 from fleet2d.studies.executors import (
     MAX_BATCH,
     Crew,
@@ -108,6 +112,38 @@ class SerialAsElsewhere(SerialExecutor):
             future: Future[Any] = Future()
             future.set_exception(error)
             return future
+
+
+def collects_after(task: WorkerTask) -> int:
+    return gc.get_threshold()[0]
+
+
+def new_pages_of_an_array(task: WorkerTask) -> int:
+    import resource
+
+    faults = [
+        resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        for _ in range(2)
+        if np.ones(2_500_000).all()
+    ]
+    return faults[1] - faults[0]
+
+
+def test_garbage_is_collected_rarely_in_tasks() -> None:
+    usual = gc.get_threshold()
+
+    (end,) = ends_of(Crew(SerialExecutor()), collects_after, "a")
+
+    assert end.payload == OBJECTS
+    assert usual == gc.get_threshold()
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
+def test_workers_keep_the_memory_of_freed_arrays_for_the_next_ones() -> None:
+    with LocalExecutor(1) as executor:
+        (end,) = ends_of(Crew(executor), new_pages_of_an_array, "a")
+
+    assert end.payload < 500
 
 
 def number_of(task: WorkerTask) -> int:

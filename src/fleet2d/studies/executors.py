@@ -29,7 +29,7 @@ from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 from fleet2d.errors import ComponentError, InputError
-from fleet2d.runtime.memory import peak_memory_mb, rare_collections
+from fleet2d.runtime.memory import keep_free_memory, peak_memory_mb, rare_collections
 
 # How often a task is tried whose worker dies each time.
 MAX_ATTEMPTS = 3
@@ -234,7 +234,8 @@ def run_batch(
     job = _loaded(content)
     end_s = time.monotonic() + seconds
     results = []
-    with HOME_FOLDER.within(plans):
+    keep_free_memory()
+    with HOME_FOLDER.within(plans), rare_collections():
         for task in tasks:
             results.append(job(task))
             if time.monotonic() >= end_s:
