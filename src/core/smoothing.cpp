@@ -156,10 +156,10 @@ private:
         const Lanes<W> scale = filtered_.scale[t];
         const Lanes<W> if_in_view = likely[0] * scale, if_hidden = likely[1] * scale;
         for (i64 stage = 0; stage < stages_; ++stage) {
+            multiply<W>(if_hidden, ahead_hidden_[stage], comes_[stage], {0, model_.patches()});
             for (i64 room = 0; room < rooms_; ++room) {
-                const Range range = model_.patches_of(room);
-                multiply<W>(if_hidden, ahead_hidden_[stage], comes_[stage], range);
                 if (!is_watched(t, room)) continue;
+                const Range range = model_.patches_of(room);
                 multiply<W>(if_hidden, ahead_hidden_[stage], hidden_[stage], range);
                 multiply<W>(if_in_view, ahead_in_view_[stage], in_view_[stage], range);
             }
@@ -174,12 +174,18 @@ private:
         for (i64 room = 0; room < rooms_; ++room) {
             if (!visible[room]) continue;
             const auto [begin, end] = model_.patches_of(room);
-            for (i64 p = begin; p < end; ++p) {
-                const Lanes<W> part = steps_.part()[p];
-                for (i64 stage = 0; stage < stages_; ++stage) {
-                    comes_(stage, p) = part * in_view_(stage, p) + (Lanes<W>(1.0) - part) * hidden_(stage, p);
-                }
+            for (i64 stage = 0; stage < stages_; ++stage) {
+                draw_view(end - begin, steps_.part().data + begin, in_view_[stage].data + begin,
+                          hidden_[stage].data + begin, comes_[stage].data + begin);
             }
+        }
+    }
+
+    // The likelihood for coming to each patch of a room that is in view in parts.
+    static void draw_view(i64 patches, const Lanes<W>* part, const Lanes<W>* in_view, const Lanes<W>* hidden,
+                          Lanes<W>* __restrict comes) {
+        for (i64 p = 0; p < patches; ++p) {
+            comes[p] = part[p] * in_view[p] + (Lanes<W>(1.0) - part[p]) * hidden[p];
         }
     }
 
