@@ -39,6 +39,28 @@ struct Gaps {
     }
 };
 
+struct Spot {
+    f64 x, y;
+
+    f64 distance_to(const Spot& other) const {
+        const f64 dx = x - other.x, dy = y - other.y;
+        return std::sqrt(dx * dx + dy * dy);
+    }
+};
+
+Spot spot_of(View<const i64> point) { return {static_cast<f64>(point[0]), static_cast<f64>(point[1])}; }
+
+// The distance of a point from the way from a to b.
+f64 distance_to_piece(const Spot& point, const Spot& a, const Spot& b) {
+    const f64 dx = b.x - a.x, dy = b.y - a.y, squared = dx * dx + dy * dy;
+    if (squared == 0) return point.distance_to(a);
+    const f64 along = ((point.x - a.x) * dx + (point.y - a.y) * dy) / squared;
+    if (along <= 0) return point.distance_to(a);
+    if (along >= 1) return point.distance_to(b);
+    const f64 beside = ((a.y - point.y) * dx - (a.x - point.x) * dy) / squared;
+    return std::abs(beside) * std::sqrt(squared);
+}
+
 }  // namespace
 
 Array<bool> points_in_sight(const Mesh& mesh, i64 x, i64 y, View<const i64, 2> points) {
@@ -123,6 +145,21 @@ ViewQueries list_view_queries(const Lenses& lenses, View<const i64, 2> widest, i
         }
     }
     return view_queries;
+}
+
+Array<bool> points_near(View<const i64, 2> points, View<const i64, 2> line, f64 reach) {
+    auto near = Array<bool>::zeros({points.size()});
+    for (i64 i = 0; i + 1 < line.size(); ++i) {
+        const Spot a = spot_of(line[i]), b = spot_of(line[i + 1]);
+        const f64 left = std::min(a.x, b.x) - reach, right = std::max(a.x, b.x) + reach;
+        const f64 bottom = std::min(a.y, b.y) - reach, top = std::max(a.y, b.y) + reach;
+        for (i64 k = 0; k < points.size(); ++k) {
+            const Spot point = spot_of(points[k]);
+            if (point.x < left || point.x > right || point.y < bottom || point.y > top) continue;
+            near[k] = near[k] || distance_to_piece(point, a, b) < reach;
+        }
+    }
+    return near;
 }
 
 }  // namespace fleet2d

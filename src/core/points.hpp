@@ -31,6 +31,10 @@ BestView best_view(const Mesh& mesh, View<const i64, 2> places, View<const i64, 
 // Which of the points, (n, 2), are in range and within the angle of a camera, regardless of walls, (n,).
 Array<bool> points_in_reach(Pose eye, i64 near_squared, i64 far_squared, i64 half_angle, View<const i64, 2> points);
 
+// Which of the points, (n, 2), are nearer than `reach` [lattice units] to a line through points, (m, 2), (n,). Rounded
+// as GEOS does.
+Array<bool> points_near(View<const i64, 2> points, View<const i64, 2> line, f64 reach);
+
 // The question whether a body is in view of a camera: both, the camera's pose, and the body's centre.
 struct ViewQuery {
     i64 camera, body;

@@ -763,7 +763,7 @@ def record_coverage(setup: tuple[Any, ...], window: Window, body: int, first: in
         body: Number of the robot among the bodies.
         first: The first step.
         end: One past the last step.
-        cache: The cached poses; emptied when the table is half full.
+        cache: The cached poses; emptied when it is full.
         record: What it has seen; `last` isn't updated for poses in the cache: see `settle_coverage`.
     """
 
@@ -898,6 +898,19 @@ def best_view(mesh: Mesh, places: numpy.typing.NDArray[numpy.int64], points: num
     Returns:
         The number of the place and of the direction, the first ones if tied; None where no point is in
         view from any place.
+    """
+
+def points_near(points: numpy.typing.NDArray[numpy.int64], line: numpy.typing.NDArray[numpy.int64], reach: float) -> numpy.typing.NDArray[numpy.bool_]:
+    """
+    Return which points are nearer to a line than a distance, which is rounded as in GEOS.
+
+    Args:
+        points: int64 (n, 2), lattice points.
+        line: int64 (m, 2), lattice points along the line.
+        reach: The distance [lattice units].
+
+    Returns:
+        bool (n,); a line of fewer than two points is near nothing.
     """
 
 def points_in_reach(x: int, y: int, heading: int, reach: tuple[int, int, int], points: numpy.typing.NDArray[numpy.int64]) -> numpy.typing.NDArray[numpy.bool_]:

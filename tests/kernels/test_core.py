@@ -607,6 +607,7 @@ CALLS: dict[str, Args] = {
     "sliding_max": lambda: (*signal(), 9, -1, 4, 0.0, 1.0),
     "until": lambda: (*signal(), np.array([0.5, 2.0, -1.0]), 0.0),
     "points_in_sight": lambda: (MESH, 100, 100, POINTS.copy()),
+    "points_near": lambda: (POINTS.copy(), POINTS[:3].copy(), 500.0),
     "best_view": lambda: (MESH, POINTS.copy(), POINTS.copy(), 90_000.0, np.eye(2), 0.5),
     "points_in_reach": lambda: (100, 100, 5, Reach(0, 90_000, 800), POINTS.copy()),
     "view_queries": lambda: (

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
 from tests.meshed_homes import all_homes, awkward_points, behind_corners, home_of
@@ -19,6 +20,7 @@ from fleet2d.kernels import (
     half_sine,
     points_in_reach,
     points_in_sight,
+    points_near,
 )
 
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
@@ -128,3 +130,49 @@ def test_points_that_are_none_are_refused(points: I64) -> None:
         points_in_sight(home.mesh, 5, 5, points)
     with pytest.raises(ValueError, match="points"):
         points_in_reach(5, 5, 0, Reach(0, 100, 1), points)
+
+
+def near(points: I64, line: I64, reach: float) -> list[bool]:
+    """Return which points are near a line, by shapely."""
+    return (shapely.distance(shapely.points(points), shapely.LineString(line)) < reach).tolist()
+
+
+@quick
+@given(seeds())
+def test_points_near_a_line_are_those_of_shapely(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.integers(-200, 200, (300, 2))
+    line = rng.integers(-200, 200, (int(rng.integers(2, 6)), 2))
+    line[-1] = line[int(rng.integers(len(line)))]  # it may stand still, and come back
+    for reach in (0.0, 1.0, 5.0, 12.5, 25.0, 90.0):
+        assert near(points, line, reach) == points_near(points, line, reach).tolist()
+
+
+@pytest.mark.parametrize(
+    ("line", "reach", "expected"),
+    [
+        ([[0, 0], [10, 0]], 4.0, [True, False, False, True]),
+        ([[0, 0], [10, 0]], 4.5, [True, True, False, True]),
+        ([[0, 0], [10, 0]], 6.0, [True, True, True, True]),
+        ([[5, 3], [5, 3]], 1.5, [True, True, False, False]),
+        ([[0, 0], [10, 0]], 0.0, [False] * 4),
+        ([[5, 3]], 9.0, [False] * 4),
+        ([], 9.0, [False] * 4),
+    ],
+)
+def test_points_near_lines_at_the_edge(
+    line: list[list[int]], reach: float, expected: list[bool]
+) -> None:
+    points = np.array([[5, 3], [5, 4], [15, 0], [-1, 0]])
+
+    result = points_near(points, np.array(line, np.int64).reshape(-1, 2), reach)
+
+    assert expected == result.tolist()
+
+
+def test_points_at_the_very_distance_are_as_in_shapely() -> None:
+    """3-4-5 triangles: the distance of points is exactly 5, which roundings may miss."""
+    line = np.array([[-400, -300], [400, 300], [0, 600]])
+    points = np.array([[x, y] for x in range(-60, 60) for y in range(-60, 60)])
+    for reach in (5.0, 10.0, 35.0):
+        assert near(points, line, reach) == points_near(points, line, reach).tolist()

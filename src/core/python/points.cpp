@@ -67,6 +67,23 @@ Returns:
     The number of the place and of the direction, the first ones if tied; None where no point is in
     view from any place.)");
     m.def(
+        "points_near",
+        [](View<const i64, 2> points, View<const i64, 2> line, f64 reach) {
+            check_points(points);
+            check_points(line);
+            return points_near(points, line, reach);
+        },
+        "points"_a, "line"_a, "reach"_a, Unlocked(),
+        R"(Return which points are nearer to a line than a distance, which is rounded as in GEOS.
+
+Args:
+    points: int64 (n, 2), lattice points.
+    line: int64 (m, 2), lattice points along the line.
+    reach: The distance [lattice units].
+
+Returns:
+    bool (n,); a line of fewer than two points is near nothing.)");
+    m.def(
         "points_in_reach",
         [](i64 x, i64 y, i64 heading, std::tuple<i64, i64, i64> reach, View<const i64, 2> points) {
             check_point(x, y);

@@ -6,7 +6,6 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
-import shapely
 from pydantic import Field
 
 from fleet2d.configuration.units import PositiveDuration, Share
@@ -18,7 +17,7 @@ from fleet2d.errors import PlacementError
 from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.plan import Room, cells_of, read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64, SUB, Bool, pairs_in_sight
+from fleet2d.kernels import F64, I64, SUB, pairs_in_sight, points_near
 from fleet2d.runtime.events import EventKind
 
 # Radius of the bodies whose ways count as the ways of people [m].
@@ -108,7 +107,7 @@ class HangoutPlaces:
         points = centres(cells)
         for door in plan.doorways:
             line = plan.lattice.to_lattice((door.start, door.end))
-            clear = ~are_near(points, line, OFF_DOORS_M * plan.lattice.units_per_m)
+            clear = ~points_near(points, line, OFF_DOORS_M * plan.lattice.units_per_m)
             points = points[clear]
             rooms = rooms[clear]
         return np.ascontiguousarray(points), rooms
@@ -162,7 +161,7 @@ class HangoutPlaces:
             route = space.route(start, goal)
             if route is not None and len(route) > 1:
                 ways += 1
-                blocked += are_near(self.points, route, reach)
+                blocked += points_near(self.points, route, reach)
         return blocked / max(ways, 1)
 
     def _proximity(self) -> F64:
@@ -175,27 +174,6 @@ class HangoutPlaces:
         gaps = ((self.points[:, None] - seats[None]) ** 2).sum(axis=2).min(axis=1)
         metres = np.sqrt(gaps.astype(np.float64)) / plan.lattice.units_per_m
         return np.maximum(0.0, 1 - metres / PERSONAL)
-
-
-def are_near(points: I64, line: I64, reach: float) -> Bool:
-    """Return whether each of some points is nearer to a line than a distance, bool (n,).
-
-    Args:
-        points: int64 (n, 2) [lattice].
-        line: The ends of its pieces, int64 (m, 2) [lattice].
-        reach: The distance [lattice].
-
-    Example:
-        >>> are_near(np.array([[5, 3], [5, 4], [15, 0]]), np.array([[0, 0], [10, 0]]), 4.0)
-        array([ True, False, False])
-    """
-    # Few points are in the box around the line: only of these the distance is measured.
-    low = line.min(axis=0) - reach
-    high = line.max(axis=0) + reach
-    is_near = ((points >= low) & (points <= high)).all(axis=1)
-    gaps = shapely.distance(shapely.points(points[is_near]), shapely.LineString(line))
-    is_near[is_near] = gaps < reach
-    return is_near
 
 
 def decay(x: F64) -> F64:
