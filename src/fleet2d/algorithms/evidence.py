@@ -91,11 +91,12 @@ def patches_of(plan: FloorPlan) -> Patches:
     room = rooms[row, column].astype(np.int64)
     total = np.bincount(room, minlength=count)
     side = np.maximum(SIDE_M / plan.lattice.cell, np.sqrt(np.ceil(total / MAX_PATCHES)))
-    box_row, box_rows = _divide(row, room, side, count)
-    box_column, box_columns = _divide(column, room, side, count)
+    box_row, box_rows = _divide(row, room, side, rooms.shape[0])
+    box_column, box_columns = _divide(column, room, side, rooms.shape[1])
     boxes = box_rows * box_columns
     first = np.cumsum(boxes) - boxes
-    box = first[room] + box_row * box_columns[room] + box_column
+    box_row = first[:, np.newaxis] + box_row * box_columns[:, np.newaxis]
+    box = box_row[room, row] + box_column[room, column]
     cells = np.bincount(box, minlength=int(boxes.sum()))
     is_patch = cells > 0
     is_patch[first[total == 0]] = True
@@ -131,24 +132,25 @@ def islands(plan: FloorPlan) -> I64 | None:
     return read_only(island)
 
 
-def _divide(place: I64, room: I64, side: F64, count: int) -> tuple[I64, I64]:
+def _divide(place: I64, room: I64, side: F64, places: int) -> tuple[I64, I64]:
     """Divide the extent of each room along one axis into equal parts.
 
     Args:
         place: int64 (cells,), row or column of each cell.
         room: int64 (cells,), room of each cell.
         side: float64 (rooms,), length of a part, approximately [cells].
-        count: Number of rooms.
+        places: Number of rows or columns.
 
     Returns:
-        The part that each cell is in, int64 (cells,), and the number of parts, int64 (rooms,).
+        The part of each room that each row or column is in, int64 (rooms, places), and the number
+        of parts, int64 (rooms,).
     """
-    low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
-    np.minimum.at(low, room, place)
-    np.maximum.at(high, room, place)
-    extent = np.maximum(high - low + 1, 1)
+    count = len(side)
+    is_there = np.bincount(room * places + place, minlength=count * places).reshape(count, -1) > 0
+    low = is_there.argmax(axis=1)
+    extent = np.maximum(places - is_there[:, ::-1].argmax(axis=1) - low, 1)
     parts = np.maximum(1, np.rint(extent / side)).astype(np.int64)
-    part: I64 = (place - low[room]) * parts[room] // extent[room]
+    part = (np.arange(places) - low[:, np.newaxis]) * parts[:, np.newaxis] // extent[:, np.newaxis]
     return part, parts
 
 
