@@ -15,7 +15,7 @@ from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64, SUB
+from fleet2d.kernels import F64, I64, SUB, Bool
 from fleet2d.kernels import earth_mover as minimal_cost
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import DAY_US, HOUR_US
@@ -128,7 +128,44 @@ def steps_in_places(history: History, state: Present) -> I64:
     The last column is away. The last row is for anyone: steps with somebody in the room, and last
     with nobody at home.
     """
-    return steps_by_hour(history, state).sum(axis=0)
+    users = [history.poses(user) for user in state.users]
+    rows = [poses.time_in_rooms for poses in users]
+    if len(users) == 1:
+        return np.array(rows * 2)
+    visits = [*(poses.visits for poses in users), _nobody(history)]
+    begin, end, room = (np.concatenate(column) for column in zip(*visits, strict=True))
+    at, is_there = _occupied(begin, end, room, len(state.home.rooms))
+    lengths = np.diff(at, append=len(history))
+    return np.array([*rows, (is_there * lengths[:, np.newaxis]).sum(axis=0)])
+
+
+def _nobody(history: History) -> tuple[I64, I64, I64]:
+    """Return a visit nowhere that lasts all the time: so there is one."""
+    return np.array([0]), np.array([len(history)]), np.array([NOWHERE])
+
+
+def _occupied(
+    begin: I64, end: I64, room: I64, rooms: int, at: I64 | None = None
+) -> tuple[I64, Bool]:
+    """Return where stretches begin in which nobody changes room, and the places with somebody.
+
+    Args:
+        begin: The first step of each visit to a room, counted from the first step of all.
+        end: One past the last step of each.
+        room: The room of each; NOWHERE is -1, the last place.
+        rooms: The number of rooms.
+        at: Steps at which stretches begin, too.
+
+    Returns:
+        int64 (stretches,), and bool (stretches, rooms + 1), the last for nobody at home.
+    """
+    at = np.unique(begin if at is None else np.concatenate([at, begin]))
+    change = np.zeros((len(at) + 1, rooms + 1), np.int64)
+    np.add.at(change, (np.searchsorted(at, begin), room), 1)
+    np.add.at(change, (np.searchsorted(at, end), room), -1)
+    is_there = np.cumsum(change[:-1], axis=0) > 0
+    is_there[:, -1] = ~is_there[:, :-1].any(axis=1)
+    return at, is_there
 
 
 def steps_by_hour(history: History, state: Present) -> I64:
@@ -144,8 +181,7 @@ def steps_by_hour(history: History, state: Present) -> I64:
         at_us = np.maximum(of_part * HOUR_US - zero_us, since) - begin_us
         hours = np.append(hours, of_part)
         hour_begins = np.append(hour_begins, -(-at_us // step_us))
-    nobody = np.array([0]), np.array([steps]), np.array([NOWHERE])
-    visits = [*(history.poses(user).visits for user in state.users), nobody]
+    visits = [*(history.poses(user).visits for user in state.users), _nobody(history)]
     begin, end, room = (np.concatenate(column) for column in zip(*visits, strict=True))
     counts = np.zeros((HOURS, len(visits), len(state.home.rooms) + 1), np.int64)
     # Each visit is divided into the hours that it lasts: how many, and which of them a part is in.
@@ -158,13 +194,8 @@ def steps_by_hour(history: History, state: Present) -> I64:
     row = np.repeat(np.arange(len(visits)), [len(begins) for begins, _, _ in visits])[visit]
     place = room[visit]  # NOWHERE is -1: the last column
     np.add.at(counts, (hours[hour] % HOURS, row, place), part_end - part_begin)
-    # In the stretches between these steps nobody changes room, and the hour is the same.
-    at = np.unique(np.concatenate([hour_begins, begin]))
-    change = np.zeros((len(at) + 1, counts.shape[2]), np.int64)
-    np.add.at(change, (np.searchsorted(at, begin), room), 1)
-    np.add.at(change, (np.searchsorted(at, end), room), -1)
-    is_there = np.cumsum(change[:-1], axis=0) > 0
-    is_there[:, -1] = ~is_there[:, :-1].any(axis=1)
+    # In these stretches the hour is the same, too.
+    at, is_there = _occupied(begin, end, room, len(state.home.rooms), hour_begins)
     stretches = is_there * np.diff(at, append=steps)[:, np.newaxis]
     at_hour = np.searchsorted(at, hour_begins)
     counts[:, -1] = 0

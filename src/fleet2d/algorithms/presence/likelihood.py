@@ -199,6 +199,8 @@ class Likelihood(Estimator):
 
     def _look_into(self, evidence: Evidence, people: People) -> None:
         """Note the watched rooms; people can only be in rooms that are joined with one of them."""
+        if self.is_watched.all():
+            return
         is_watched = self.is_watched | evidence.watched.any(axis=0)
         if np.array_equal(is_watched, self.is_watched):
             return
