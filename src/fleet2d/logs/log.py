@@ -294,7 +294,7 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
         raise LogError(
             f"{path}, line {early[0].line}: the time runs backwards there"
             f" ({counted(len(early), 'such line')}); check the clock of the log, or put its"
-            " lines in order of time by 'sort: true'"
+            " lines in order of time by 'sort: true' (as an option, --sort)"
         )
     for reading in readings:
         lasts = reading.end_us - reading.begin_us

@@ -189,7 +189,7 @@ def _in_order(
         raise LogError(
             f"{path}, line {line[row[back[0] + 1]]}: the time runs backwards there ({len(back)}"
             f" such lines, by up to {float(-np.diff(time_us).min()) / 1e6:g} s); check the clock of"
-            " the log, or put its lines in order by 'sort: true'"
+            " the log, or put its lines in order by 'sort: true' (as an option, --sort)"
         )
     order = np.argsort(time_us, kind="stable")
     note = f"{len(back)} lines ran backwards in time and were sorted in"

@@ -139,6 +139,7 @@ def _in_order(path: Path, states: list[_StateLine], noun: str, *, sort: bool) ->
             raise LogError(
                 f"{path}, {noun} {state.line}: the time of {state.entity} runs backwards there;"
                 f" check the clock of the log, or put its {noun}s in order of time by 'sort: true'"
+                " (as an option, --sort)"
             )
         last[state.entity] = state.time
     return sorted(states, key=lambda state: state.time)
