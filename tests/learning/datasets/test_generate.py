@@ -54,6 +54,31 @@ def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
     assert following[-1] is None
 
 
+def test_moments_of_the_doubled_hour_are_told_apart_by_their_offset(tmp_path: Path) -> None:
+    """The hour from two to three came twice, and one couldn't tell which of them a label meant."""
+    autumn = {
+        "start": "2026-10-25T00:00",
+        "duration": {"hours": 4},
+        "time_zone": "Europe/Berlin",
+    }
+    source = {
+        "name": "autumn",
+        "base": {"extends": "bundled:paper", "simulation": autumn},
+        "splits": {"train": {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}},
+    }
+    labels = fleet2d.dataset(source, tmp_path / "autumn", workers=1).polars("labels", "train")
+    moments = labels.select("time", "utc_offset_min").collect()
+    assert moments["time"].is_duplicated().sum() == 120
+    assert not moments.is_duplicated().any()
+    assert moments["utc_offset_min"].unique().sort().to_list() == [60, 120]
+
+
+def test_a_home_without_a_time_zone_has_no_offset(data: Dataset) -> None:
+    for table in ("evidence", "labels", "beliefs"):
+        offsets = data.polars(table, "train").select("utc_offset_min").collect()
+        assert offsets["utc_offset_min"].is_null().all()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [2, 4])
 def test_the_content_is_the_same_for_any_number_of_workers(

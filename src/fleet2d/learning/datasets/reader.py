@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, ValidationError
 from fleet2d.artifacts.manifest import Count, FileRecord, Record, Sha256, problems_of, read_json
 from fleet2d.bounds import FILE_BYTES, TABLE_BYTES, read_bytes, unpacked_bytes
 from fleet2d.errors import InputError, extra
-from fleet2d.learning.datasets.tables import SCHEMAS
+from fleet2d.learning.datasets.tables import OFFSET, SCHEMAS
 from fleet2d.storage.files import path_in
 
 if TYPE_CHECKING:
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 MANIFEST = "dataset.json"
-NULLABLE = frozenset({"next_place", "next_step", "activity"})
-"""Columns in which values may be missing: nobody knows what comes after the end of a run."""
+NULLABLE = frozenset({OFFSET, "next_place", "next_step", "activity"})
+"""Columns in which values may be missing: nobody knows what comes after the end of a run, and a
+home without a time zone has no offset from UTC."""
 LARGEST = 1e6
 """The largest absolute value of a number in a table that isn't whole, such as an area [m²]."""
 

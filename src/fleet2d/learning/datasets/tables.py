@@ -18,12 +18,16 @@ from fleet2d.runtime.events import EventKind
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
+OFFSET = "utc_offset_min"
+"""The column that tells by how many minutes local time is ahead of UTC: in the hour that a change
+of clocks doubles, `time` alone doesn't say which of two moments is meant."""
+MINUTE = np.timedelta64(1, "m")
 _KINDS: Mapping[str, pa.DataType] = {
     **dict.fromkeys(("run", "step", "next_step"), pa.int32()),
     **dict.fromkeys(("time", "start"), pa.timestamp("us")),
     **dict.fromkeys(("area_m2", "x", "y", "days"), pa.float64()),
     **dict.fromkeys(("watched", "probability"), pa.float32()),
-    "seen": pa.int16(),
+    **dict.fromkeys(("seen", OFFSET), pa.int16()),
     "seed": pa.int64(),
     "users": pa.list_(pa.string()),
 }
@@ -31,9 +35,9 @@ _KINDS: Mapping[str, pa.DataType] = {
 _COLUMNS = {
     "runs": "run split home household varied users seed start days digest",
     "rooms": "run room kind area_m2 x y",
-    "evidence": "run time step room kind user watched seen",
-    "labels": "run time step user place next_place next_step activity",
-    "beliefs": "run time step model user place probability",
+    "evidence": f"run time {OFFSET} step room kind user watched seen",
+    "labels": f"run time {OFFSET} step user place next_place next_step activity",
+    "beliefs": f"run time {OFFSET} step model user place probability",
 }
 SCHEMAS: Mapping[str, pa.Schema] = {
     table: pa.schema([(name, _KINDS.get(name, pa.string())) for name in names.split()])
@@ -43,7 +47,8 @@ SCHEMAS: Mapping[str, pa.Schema] = {
 
 `step` and `time` are those of the last step that a row may know of: of a bin of evidence its last,
 of a belief the one at which it was held, of a label the one whose truth it tells. So evidence up to
-a step, joined with the labels of that step, has no knowledge of the future.
+a step, joined with the labels of that step, has no knowledge of the future. `time` is local; its
+offset from UTC is null if the home has no time zone.
 """
 
 
@@ -95,7 +100,11 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         rows = len(next(iter(columns.values())))
         columns["run"] = np.full(rows, planned.number, np.int32)
         if "step" in columns:
-            columns["time"] = clock.times(np.asarray(columns["step"], np.int64))
+            at = np.asarray(columns["step"], np.int64)
+            local = clock.times(at)
+            columns["time"] = local
+            offset = (local - clock.stamps(at)) // MINUTE
+            columns[OFFSET] = np.full(rows, np.nan) if clock.zone is None else offset
     return {name: _table(name, of_table) for name, of_table in parts.items()}
 
 
@@ -200,7 +209,7 @@ def _array(values: Any, kind: pa.DataType) -> Any:
     if kind == pa.string():
         return text_array(values, np.arange(len(values)))
     numbers = np.asarray(values)
-    missing = np.isnan(numbers) if kind in (pa.int32(), pa.int64()) else None
+    missing = np.isnan(numbers) if kind in (pa.int16(), pa.int32(), pa.int64()) else None
     if missing is not None and missing.any():
         numbers = np.where(missing, 0, numbers)
     return number_array(numbers.astype(kind.to_pandas_dtype()), kind, missing)
