@@ -3,6 +3,7 @@
 import { useSignal } from "@preact/signals";
 import type { ComponentType } from "preact";
 import { useRef } from "preact/hooks";
+import { showDay } from "./actions";
 import { copyLink } from "./address";
 import type { VerdictFacts } from "./contract";
 import { DAY_US } from "./data/clock";
@@ -103,7 +104,6 @@ function Header() {
 
 /** How the timeline shows the run, and which part of it. */
 function Tools() {
-  const run = state.run.value!;
   const { view } = state;
   return (
     <section class="tools" aria-label="Timeline settings">
@@ -128,13 +128,7 @@ function Tools() {
           <button type="button" onClick={() => state.showRange(state.beginUs.value, state.endUs.value)}>
             Whole run
           </button>
-          <button
-            type="button"
-            onClick={() => {
-              const start = run.clock.dayStart(run.clock.day(state.moment.value));
-              state.showRange(start, start + DAY_US);
-            }}
-          >
+          <button type="button" onClick={showDay}>
             Day
           </button>
         </span>

@@ -1,7 +1,6 @@
 /** Everything that can be done on the page: by a key, by the palette, by buttons. */
 
 import { copyLink } from "./address";
-import { DAY_US } from "./data/clock";
 import { downloadFilm, goToFailure } from "./film";
 import { status } from "./live/feed";
 import { branchHere, orderAll } from "./live/orders";
@@ -33,10 +32,12 @@ function step(by: 1 | -1): void {
   state.goTo((Math.round(state.moment.value / stepUs) + by) * stepUs);
 }
 
-function showDay(): void {
-  const { clock } = state.run.value!;
-  const start = clock.dayStart(clock.day(state.moment.value));
-  state.showRange(start, start + DAY_US);
+export function showDay(): void {
+  state.showRange(...state.run.value!.clock.dayOf(state.moment.value));
+}
+
+function goDays(by: 1 | -1): void {
+  state.goTo(state.run.value!.clock.daysLater(state.moment.value, by));
 }
 
 function toggleHelp(): void {
@@ -77,8 +78,8 @@ export const ACTIONS: readonly Action[] = [
   { title: "Play the story: a reel of its moments", key: "r", run: playReel, isPossible: () => isStored() && state.run.value!.facts.story.length > 0 },
   { title: "A step back", key: ",", run: () => step(-1) },
   { title: "A step forward", key: ".", run: () => step(1) },
-  { title: "A day back", key: "[", run: () => state.goTo(state.moment.value - DAY_US) },
-  { title: "A day forward", key: "]", run: () => state.goTo(state.moment.value + DAY_US) },
+  { title: "A day back", key: "[", run: () => goDays(-1) },
+  { title: "A day forward", key: "]", run: () => goDays(1) },
   { title: "Next answer, or event of the chosen kind", key: "n", run: () => state.jump(true) },
   { title: "Previous answer, or event of the chosen kind", key: "p", run: () => state.jump(false) },
   { title: "Next failure", key: "v", run: goToFailure, isPossible: () => state.run.value!.facts.marks.some((mark) => mark.kind === "violated") },

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { Clock, durationText } from "../src/data/clock";
+import { ticks } from "../src/timeline/draw";
 
 const clock = new Clock("2026-01-05T06:00:00", 1e6, 10 * 86_400);
 
@@ -21,6 +22,12 @@ describe("a clock that is changed", () => {
     expect([changed.day(27 * 3600e6 - 1), changed.day(27 * 3600e6)]).toEqual([2, 3]);
   });
 
+  it("goes to the same reading of the next day, 25 hours later", () => {
+    expect(changed.dayOf(3 * 3600e6)).toEqual([2 * 3600e6, 27 * 3600e6]);
+    expect(changed.daysLater(3 * 3600e6, 1)).toBe(28 * 3600e6);
+    expect(changed.daysLater(28 * 3600e6, -1)).toBe(3 * 3600e6);
+  });
+
   it.each([
     ["2026-10-25T02:30", 4.5 * 3600e6],
     ["day 2 03:00", 6 * 3600e6],
@@ -34,6 +41,17 @@ describe("a clock that is changed", () => {
     expect(changed.stampText(5.5 * 3600e6)).toBe("2026-10-25T01:30:00Z");
     expect(changed.ofStamp("2026-10-25T02:30:00")).toBe(4.5 * 3600e6);
     expect(clock.ofStamp(clock.stampText(90e6))).toBe(90e6);
+  });
+
+  it("has ticks at round readings after the change, too", () => {
+    const scale = { from: 3 * 3600e6, to: 15 * 3600e6, width: 1100 };
+    const hours = Array.from({ length: 13 }, (_, hour) => `${String(hour).padStart(2, "0")}:00`);
+    expect([...ticks(scale, changed)].map((us) => changed.timeText(us, false))).toEqual(hours);
+  });
+
+  it("has ticks of days at midnight before and after the change", () => {
+    const scale = { from: 0, to: 34 * 3600e6, width: 140 };
+    expect([...ticks(scale, changed)]).toEqual([-22 * 3600e6, 2 * 3600e6, 27 * 3600e6]);
   });
 
   it("goes past a gap", () => {

@@ -59,6 +59,18 @@ export class Clock {
     return this.moment(this.localDayStart(day));
   }
 
+  /** The first and the last moment of the day that a moment is in, which may last 23 or 25 hours. */
+  dayOf(us: number): [number, number] {
+    const day = this.day(us);
+    return [this.dayStart(day), this.dayStart(day + 1)];
+  }
+
+  /** The moment some days later, at which the clock reads the same. */
+  daysLater(us: number, days: number): number {
+    const day = this.day(us);
+    return this.ofShare(this.share(us, day), day + days);
+  }
+
   /** Where in a day a moment is by what the clock reads, from 0 to 1 at the next midnight. */
   share(us: number, day: number): number {
     return (this.local(us) - this.localDayStart(day)) / (DAY_MS * 1000);

@@ -55,17 +55,17 @@ function Sparkline({ values }: { values: readonly number[] }) {
   );
 }
 
-/** The begin of each day of a run. */
-function daysOf({ clock, beginUs, endUs }: Run): number[] {
+/** The first and the last moment of each day of a run. */
+function daysOf({ clock, beginUs, endUs }: Run): [number, number][] {
   const first = clock.day(beginUs);
   const count = clock.day(Math.max(beginUs, endUs - 1)) - first + 1;
-  return Array.from({ length: Math.min(count, 400) }, (_, i) => clock.dayStart(first + i));
+  return Array.from({ length: Math.min(count, 400) }, (_, i) => clock.dayOf(clock.dayStart(first + i)));
 }
 
 function seenTile(run: Run): Tile | null {
   const people = run.bodies.filter((body) => !body.robot);
   if (run.sightings.length === 0) return null;
-  const days = daysOf(run).map((begin) => people.reduce((sum, { name }) => sum + timeWithin(run.seen(name), begin, begin + DAY_US), 0) / 3600e6);
+  const days = daysOf(run).map(([begin, end]) => people.reduce((sum, { name }) => sum + timeWithin(run.seen(name), begin, end), 0) / 3600e6);
   const total = days.reduce((sum, hours) => sum + hours, 0);
   const length = (run.endUs - run.beginUs) / DAY_US;
   return { words: "People in view", value: (total / Math.max(length, 1 / 24)).toFixed(1), unit: "h a day", days };
@@ -90,7 +90,7 @@ function requestTile(run: Run): Tile | null {
   const asked = run.events.ofKind("asks");
   const accepted = run.events.ofKind("accepted").map((row) => row.us);
   if (asked.length === 0) return null;
-  const days = daysOf(run).map((begin) => lastAtMost(accepted, begin + DAY_US) - lastAtMost(accepted, begin));
+  const days = daysOf(run).map(([begin, end]) => lastAtMost(accepted, end) - lastAtMost(accepted, begin));
   return { words: "Requests accepted", value: String(accepted.length), unit: `of ${asked.length} asked`, days };
 }
 
@@ -98,6 +98,6 @@ function searchTile(run: Run): Tile | null {
   const searches = run.events.ofKind("find_begins");
   const found = run.events.ofKind("found").map((row) => row.us);
   if (searches.length === 0) return null;
-  const days = daysOf(run).map((begin) => lastAtMost(found, begin + DAY_US) - lastAtMost(found, begin));
+  const days = daysOf(run).map(([begin, end]) => lastAtMost(found, end) - lastAtMost(found, begin));
   return { words: "Believed found", value: String(found.length), unit: `of ${searches.length} searches`, days };
 }

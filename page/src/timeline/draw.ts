@@ -204,11 +204,18 @@ export function tickStep(scale: Scale, pixels = 84): number {
   return (STEPS.find((seconds) => seconds * SECOND >= leastStep) ?? STEPS[STEPS.length - 1]!) * SECOND;
 }
 
-/** The ticks of the axis in view. */
-function* ticks(scale: Scale, clock: Clock): Generator<number> {
+/** The ticks of the axis in view: at round readings of the clock, also on days on which it is changed. */
+export function* ticks(scale: Scale, clock: Clock): Generator<number> {
   const step = tickStep(scale);
-  const midnight = clock.dayStart(clock.day(scale.from));
-  for (let us = midnight + Math.max(0, Math.floor((scale.from - midnight) / step) - 1) * step; us <= scale.to; us += step) yield us;
+  const days = Math.max(1, Math.round(step / DAY_US));
+  for (let day = clock.day(scale.from); clock.dayStart(day) <= scale.to; day += days) {
+    const reached = clock.share(Math.max(scale.from, clock.dayStart(day)), day) * DAY_US;
+    for (let at = Math.max(0, Math.floor(reached / step) - 1) * step; at < DAY_US; at += step) {
+      const us = clock.ofShare(at / DAY_US, day);
+      if (us > scale.to) return;
+      yield us;
+    }
+  }
 }
 
 function drawGrid(context: Context, scale: Scale, clock: Clock, colors: Colors, height: number): void {
