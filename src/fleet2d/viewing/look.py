@@ -5,10 +5,13 @@ a home, and the tables here as constants that `tools.contract_types` writes.
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+from fleet2d.configuration.documents import read_document
 from fleet2d.floorplan.rooms.room import Room
 from fleet2d.viewing.contract import ShapeFacts
 
@@ -178,304 +181,129 @@ class Symbol:
         self.wide = wide
         self.deep = deep
         self.shapes: list[ShapeFacts] = []
+        self._edges = {"left": -wide / 2, "right": wide / 2, "back": -deep / 2, "front": deep / 2}
 
-    def box(
-        self,
-        left: float,
-        bottom: float,
-        right: float,
-        top: float,
-        fill: str | None,
-        radius: float = 0.04,
-        edge: str | None = None,
-    ) -> None:
-        """Draw a box with round corners, and nothing where it has no extent."""
-        if right > left and top > bottom:
-            self._add("box", (left, bottom, right, top), fill, edge, radius)
-
-    def whole(self, fill: str, radius: float = 0.04, edge: str | None = None) -> None:
-        """Draw a box as large as the piece."""
-        self.inset(0, fill, radius, edge)
-
-    def inset(
-        self, margin: float, fill: str | None, radius: float = 0.04, edge: str | None = None
-    ) -> None:
-        """Draw a box that leaves a margin of the piece."""
-        x = self.wide / 2 - margin
-        y = self.deep / 2 - margin
-        self.box(-x, -y, x, y, fill, radius, edge)
-
-    def ellipse(
-        self, x: float, y: float, rx: float, ry: float, fill: str | None, edge: str | None = None
-    ) -> None:
-        """Draw an ellipse, and nothing where it has no extent."""
-        if rx > 0 and ry > 0:
-            self._add("ellipse", (x - rx, y - ry, x + rx, y + ry), fill, edge)
-
-    def disc(
-        self, x: float, y: float, radius: float, fill: str | None, edge: str | None = None
-    ) -> None:
-        """Draw a disc."""
-        self.ellipse(x, y, radius, radius, fill, edge)
-
-    def line(self, x0: float, y0: float, x1: float, y1: float, color: str) -> None:
-        """Draw a line."""
-        self._add("line", (x0, y0, x1, y1), None, color)
-
-    def _add(
+    def add(
         self,
         kind: Literal["box", "ellipse", "line"],
-        at: tuple[float, float, float, float],
-        fill: str | None,
-        edge: str | None,
+        at: Iterable[float | str],
+        fill: str | None = None,
+        edge: str | None = None,
         radius: float = 0.0,
     ) -> None:
-        x0, y0, x1, y1 = (round(number, 4) for number in at)
+        """Draw a shape at two places, as `symbols.yaml` has them; none without an extent."""
+        x0, y0, x1, y1 = (round(self._place(place), 4) for place in at)
+        if kind != "line" and (x1 <= x0 or y1 <= y0):
+            return
+        colors = _symbols()["colors"]
+        fill = colors.get(fill, fill)
+        edge = colors.get(edge, edge)
         shape = ShapeFacts(kind=kind, at=(x0, y0, x1, y1), fill=fill, edge=edge, radius=radius)
         self.shapes.append(shape)
 
+    def _place(self, place: float | str) -> float:
+        """Return a coordinate [m]: that of an edge such as `left`, or `left + 0.1`."""
+        if not isinstance(place, str):
+            return place
+        edge, *offset = place.split()
+        return self._edges[edge] + float("".join(offset) or 0)
 
-OAK = "#c99f6c"
-DARK_OAK = "#b98c58"
-PALE_OAK = "#d6bc93"
-CLOTH = "#6f8791"
-SEAT = "#97adb5"
-WHITE = "#ffffff"
-ENAMEL = "#c3c8cb"
-DRAIN = "#8c959b"
-TAP = "#949ca3"
-STEEL = "#b6bcc1"
-GLASS = "#9fb9c0"
+
 BOOKS = ("#8c9fb3", "#c98f6b", "#7fa08c", "#d8c28a", "#a58aa8")
 BOXES = ("#e4d9c4", "#bfc9cc", "#d9c7a8")
 
 
 def _bed(s: Symbol) -> None:
     x, back, front = s.wide / 2, -s.deep / 2, s.deep / 2
-    s.whole(DARK_OAK, 0.06)
-    s.box(-x + 0.04, back + 0.1, x - 0.04, front - 0.02, "#f7f5f0", 0.08)
     pillows = 2 if s.wide > 1.2 else 1
     pitch = (s.wide - 0.2) / pillows
     for number in range(pillows):
         left = -x + 0.13 + number * pitch
-        s.box(left, back + 0.16, left + pitch - 0.06, back + 0.52, WHITE, 0.1, "#cfcac0")
-    s.box(-x + 0.04, back + 0.68, x - 0.04, front - 0.02, "#9fb0c9", 0.08)
-    s.box(-x + 0.04, back + 0.68, x - 0.04, back + 0.9, "#c5d0e0", 0.05)
+        pillow = (left, back + 0.16, left + pitch - 0.06, back + 0.52)
+        s.add("box", pillow, "white", "#cfcac0", 0.1)
+    s.add("box", (-x + 0.04, back + 0.68, x - 0.04, front - 0.02), "#9fb0c9", radius=0.08)
+    s.add("box", (-x + 0.04, back + 0.68, x - 0.04, back + 0.9), "#c5d0e0", radius=0.05)
 
 
 def _sofa(s: Symbol) -> None:
     x, back, front = s.wide / 2, -s.deep / 2, s.deep / 2
-    s.whole(CLOTH, 0.12)
     seats = 3 if s.wide > 1.9 else 2
     pitch = (s.wide - 0.32) / seats
     for number in range(seats):
         left = -x + 0.18 + number * pitch
-        s.box(left, back + 0.24, left + pitch - 0.04, front - 0.05, SEAT, 0.07)
-    s.box(-x + 0.2, back + 0.14, -x + 0.52, back + 0.36, "#d8a66b", 0.07)
-
-
-def _armchair(s: Symbol) -> None:
-    s.whole(CLOTH, 0.12)
-    x, y = s.wide / 2 - 0.14, s.deep / 2
-    s.box(-x, -y + 0.2, x, y - 0.03, SEAT, 0.08)
-
-
-def _chair(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
-    s.box(-x + 0.03, -y + 0.03, x - 0.03, y, "#d9b585", 0.08)
-    s.box(-x + 0.02, -y, x - 0.02, -y + 0.09, DARK_OAK, 0.04)
+        seat = (left, back + 0.24, left + pitch - 0.04, front - 0.05)
+        s.add("box", seat, "seat", radius=0.07)
+    s.add("box", (-x + 0.2, back + 0.14, -x + 0.52, back + 0.36), "#d8a66b", radius=0.07)
 
 
 def _table(s: Symbol) -> None:
-    s.whole(OAK, 0.08)
     x, y = s.wide / 2 - 0.06, s.deep / 2
     for number in range(int((s.deep - 0.14) / 0.17) + 1):
-        s.line(-x, -y + 0.14 + 0.17 * number, x, -y + 0.14 + 0.17 * number, "#ffffff3a")
-
-
-def _coffee_table(s: Symbol) -> None:
-    s.whole(OAK, 0.12)
-    s.box(-0.2, -0.1, 0.08, 0.1, "#f2efe8", 0.02)
-
-
-def _desk(s: Symbol) -> None:
-    s.whole(OAK)
-    back = -s.deep / 2
-    s.box(-0.34, back + 0.08, 0.34, back + 0.14, "#2f363d", 0.02)
-    s.box(-0.22, -0.02, 0.22, 0.14, "#edebe6", 0.02)
-
-
-def _bench(s: Symbol) -> None:
-    x, y = s.wide / 2 - 0.05, s.deep / 2
-    s.whole(OAK, 0.06)
-    s.box(-x, -y + 0.06, x, y - 0.04, "#c9bfae", 0.06)
+        along = -y + 0.14 + 0.17 * number
+        s.add("line", (-x, along, x, along), edge="#ffffff3a")
 
 
 def _wardrobe(s: Symbol) -> None:
     x, y = s.wide / 2, s.deep / 2
-    s.whole("#cdb48f", 0.03)
-    s.box(-x + 0.03, -y + 0.03, x - 0.03, y - 0.07, "#dcc7a6", 0.02)
     doors = max(2, round(s.wide / 0.55))
     for number in range(1, doors):
         at = -x + s.wide * number / doors
-        s.line(at, -y + 0.03, at, y, DARK_OAK)
+        s.add("line", (at, -y + 0.03, at, y), edge="dark oak")
 
 
 def _bookshelf(s: Symbol) -> None:
     x, y = s.wide / 2, s.deep / 2
-    s.whole(DARK_OAK, 0.02)
     for number in range(int((s.wide - 0.14) / 0.07)):
         left = -x + 0.05 + number * 0.07
         top = y - 0.06 - number % 3 * 0.02
-        s.box(left, -y + 0.05, left + 0.055, top, BOOKS[number % len(BOOKS)], 0.01)
+        book = (left, -y + 0.05, left + 0.055, top)
+        s.add("box", book, BOOKS[number % len(BOOKS)], radius=0.01)
 
 
 def _shelf(s: Symbol) -> None:
     x, y = s.wide / 2, s.deep / 2
-    s.whole("#cdbfa8", 0.02)
     for number in range(int((s.wide - 0.1) / 0.3)):
         left = -x + 0.06 + number * 0.3
-        s.box(left, -y + 0.06, left + 0.24, y - 0.05, BOXES[number % len(BOXES)], 0.03)
-
-
-def _dresser(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
-    s.whole(PALE_OAK, 0.03)
-    s.line(0, y - 0.1, 0, y, DARK_OAK)
-    s.line(-x, y - 0.1, x, y - 0.1, DARK_OAK)
+        box = (left, -y + 0.06, left + 0.24, y - 0.05)
+        s.add("box", box, BOXES[number % len(BOXES)], radius=0.03)
 
 
 def _nightstand(s: Symbol) -> None:
-    s.whole(PALE_OAK)
-    s.disc(0, 0, min(0.12, s.deep / 3), "#fff3d0", "#d9c48f")
-
-
-def _tv(s: Symbol) -> None:
-    x = s.wide / 2 - 0.1
-    s.whole("#cdb48f")
-    s.box(-x, -0.05, x, 0.05, "#20262c", 0.02)
-
-
-def _fridge(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
-    s.whole("#e6e9eb", 0.05, STEEL)
-    s.line(-x, y - 0.09, x, y - 0.09, STEEL)
-    s.box(x - 0.14, y - 0.05, x - 0.05, y - 0.01, "#8c949b", 0.01)
-
-
-def _counter(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
-    s.whole("#f1eee8", 0.01)
-    s.box(-x, y - 0.07, x, y, "#cdb48f", 0)
+    radius = min(0.12, s.deep / 3)
+    s.add("ellipse", (-radius, -radius, radius, radius), "#fff3d0", "#d9c48f")
 
 
 def _stove(s: Symbol) -> None:
-    x, y = s.wide / 2 - 0.05, s.deep / 2
-    _counter(s)
-    s.box(-x, -y + 0.05, x, y - 0.11, "#2c3238", 0.03)
-    for across in (-s.wide / 4.4, s.wide / 4.4):
-        for along in (-s.deep / 4.4, s.deep / 8):
-            s.disc(across, along, 0.08, None, "#8f979e")
+    for x in (-s.wide / 4.4, s.wide / 4.4):
+        for y in (-s.deep / 4.4, s.deep / 8):
+            s.add("ellipse", (x - 0.08, y - 0.08, x + 0.08, y + 0.08), edge="#8f979e")
 
 
-def _sink(s: Symbol) -> None:
-    x, y = s.wide / 2 - 0.09, s.deep / 2
-    _counter(s)
-    s.box(-x, -y + 0.12, x, y - 0.12, "#c8cdd2", 0.07, "#a8afb5")
-    s.disc(0, 0, 0.035, "#7d868d")
-    s.box(-0.02, -y + 0.04, 0.02, -y + 0.24, TAP, 0.02)
-
-
-def _washbasin(s: Symbol) -> None:
-    x, y = s.wide / 2 - 0.08, s.deep / 2
-    s.whole(WHITE, 0.1, ENAMEL)
-    s.box(-x, -y + 0.12, x, y - 0.06, "#e3edef", 0.2)
-    s.disc(0, 0.02, 0.03, DRAIN)
-    s.box(-0.02, -y + 0.03, 0.02, -y + 0.18, TAP, 0.02)
-
-
-def _toilet(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
-    s.box(-x, -y, x, -y + 0.2, WHITE, 0.04, ENAMEL)
-    s.ellipse(0, 0.08, x - 0.02, y - 0.1, WHITE, ENAMEL)
-    s.ellipse(0, 0.09, x - 0.09, y - 0.19, "#dde8ea")
-
-
-def _bathtub(s: Symbol) -> None:
-    x, y = s.wide / 2 - 0.08, s.deep / 2 - 0.09
-    s.whole(WHITE, 0.08, ENAMEL)
-    s.box(-x, -y, x, y, "#d5e7eb", 0.26)
-    s.disc(s.wide / 2 - 0.24, 0, 0.035, DRAIN)
-
-
-def _shower(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
-    s.whole("#cfe3e866", 0.02, GLASS)
-    s.line(-x, -y, x, y, f"{GLASS}88")
-    s.line(x, -y, -x, y, f"{GLASS}88")
-    s.disc(0, 0, 0.06, "#a9bcc2")
-
-
-def _washing_machine(s: Symbol) -> None:
-    s.whole("#f4f5f5", 0.05, ENAMEL)
-    s.disc(0, 0.02, 0.2, "#b9c7ce", "#9aa4aa")
-    s.disc(0, 0.02, 0.12, "#8fa5b0")
-
-
-def _rug(s: Symbol) -> None:
-    s.whole("#b9a58c66", 0.05, "#9a876e66")
-
-
-def _glass(s: Symbol) -> None:
-    s.whole("#bcd9e377", 0, "#8fb4c1")
-
-
-def _charger(s: Symbol) -> None:
-    s.whole("#2c3338", 0.06)
-    s.box(-0.07, -0.02, 0.07, 0.02, "#3fd0c9", 0.02)
-
-
-def _treadmill(s: Symbol) -> None:
-    s.whole("#454b52", 0.06)
-    s.inset(0.1, "#23282d", 0.03)
-
-
-def _other(s: Symbol) -> None:
-    s.whole("#d9d8d4", 0.04, OUTLINE_EDGE)
-
-
-SYMBOLS: Mapping[str, Callable[[Symbol], None]] = MappingProxyType(
+_UPON: Mapping[str, Callable[[Symbol], None]] = MappingProxyType(
     {
         "bed": _bed,
         "single_bed": _bed,
         "sofa": _sofa,
-        "armchair": _armchair,
-        "chair": _chair,
         "table": _table,
-        "coffee_table": _coffee_table,
-        "desk": _desk,
-        "bench": _bench,
         "wardrobe": _wardrobe,
         "bookshelf": _bookshelf,
         "shelf": _shelf,
-        "dresser": _dresser,
         "nightstand": _nightstand,
-        "tv": _tv,
-        "fridge": _fridge,
-        "kitchen_counter": _counter,
         "stove": _stove,
-        "sink": _sink,
-        "washbasin": _washbasin,
-        "toilet": _toilet,
-        "bathtub": _bathtub,
-        "shower": _shower,
-        "washing_machine": _washing_machine,
-        "rug": _rug,
-        "glass": _glass,
-        "charger": _charger,
-        "treadmill": _treadmill,
     }
 )
+"""What is drawn upon listed shapes, as its number or its size depends on the piece."""
+
+
+@cache
+def _symbols() -> dict[str, Any]:
+    """Return the colours and the symbols of the YAML file beside this one."""
+    return read_document(Path(__file__).with_name("symbols.yaml")).data
+
+
+def symbol_names() -> set[str]:
+    """Return the types of furniture that have a symbol of their own."""
+    return set(_symbols()["symbols"])
 
 
 def symbol_of(kind: str, wide: float, deep: float) -> list[ShapeFacts]:
@@ -485,5 +313,9 @@ def symbol_of(kind: str, wide: float, deep: float) -> list[ShapeFacts]:
     ['box', 'ellipse']
     """
     symbol = Symbol(wide, deep)
-    SYMBOLS.get(kind, _other)(symbol)
+    listed = _symbols()
+    for shape in listed["symbols"].get(kind, listed["other"]):
+        symbol.add(**shape)
+    if kind in _UPON:
+        _UPON[kind](symbol)
     return symbol.shapes

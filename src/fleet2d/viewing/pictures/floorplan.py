@@ -51,13 +51,13 @@ from fleet2d.viewing.look import (
     JOINT_M,
     OUTLINE_EDGE,
     OUTLINE_FILL,
-    SYMBOLS,
     WALL_EDGE,
     WALL_M,
     WALL_TOP,
     WOOD,
     floor_of,
     room_labels,
+    symbol_names,
     symbol_of,
 )
 
@@ -109,12 +109,13 @@ def _fill(polygons: Iterable[shapely.Polygon], axes: Axes, **style: Any) -> None
 def label_objects(plan: FloorPlan, axes: Axes) -> None:
     """Write the type of each object without a symbol on it, where it is large enough."""
     metre_pt = points_per_m(axes)
+    drawn = symbol_names()
     for item in plan.objects:
         x0, y0, x1, y1 = item.footprint.bounds
         label = item.type.replace("_", " ")
         space = (x1 - x0) * metre_pt, (y1 - y0) * metre_pt
         size, rotation = _fit(space, LETTER_WIDTH * len(label), 1.2, LABEL_PT[1])
-        if size < LABEL_PT[0] or item.type in SYMBOLS:
+        if size < LABEL_PT[0] or item.type in drawn:
             continue
         middle = item.footprint.centroid
         style: dict[str, Any] = {"ha": "center", "va": "center", "color": LABEL_COLOR}
