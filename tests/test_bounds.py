@@ -1,25 +1,15 @@
 """The table of bounds: whole, and the page that is made of it says the same."""
 
 import ast
-import importlib.util
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import pytest
-
-ROOT = Path(__file__).parent.parent
+from tests.scripts import ROOT, script
 
 
 @pytest.fixture(scope="module")
 def bounds() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("bounds", ROOT / "benchmarks" / "bounds.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["bounds"] = module
-    spec.loader.exec_module(module)
-    return module
+    return script("benchmarks/bounds.py")
 
 
 def test_every_bound_has_a_name_a_must_and_an_aim_that_is_harder(bounds: ModuleType) -> None:

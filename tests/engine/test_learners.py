@@ -188,26 +188,17 @@ def test_histories_are_whole_periods_without_gaps(max_span: int | None) -> None:
     assert [(k, k + 1, k, start + timedelta(seconds=k)) for k in range(600)] == handed["b"]
 
 
-def test_metrics_get_the_rest_of_a_period_at_the_end() -> None:
+@pytest.mark.parametrize(
+    ("period", "expected"),
+    [("4 min", [(0, 240), (240, 480), (480, 600)]), ("5 min", [(0, 300), (300, 600)])],
+)
+def test_metrics_get_every_period_once_and_at_the_end_its_rest(
+    period: str, expected: list[tuple[int, int]]
+) -> None:
     handed: list[tuple[int, int]] = []
-    fleet2d.run(
-        watched(
-            "10 min",
-            metrics={"m": metric(lambda h, s: handed.append((h.first, h.end)), period="4 min")},
-        )
-    )
-    assert [(0, 240), (240, 480), (480, 600)] == handed
-
-
-def test_metrics_of_a_run_that_ends_with_a_period_are_not_asked_again() -> None:
-    handed: list[tuple[int, int]] = []
-    fleet2d.run(
-        watched(
-            "10 min",
-            metrics={"m": metric(lambda h, s: handed.append((h.first, h.end)), period="5 min")},
-        )
-    )
-    assert [(0, 300), (300, 600)] == handed
+    keep = metric(lambda h, s: handed.append((h.first, h.end)), period=period)
+    fleet2d.run(watched("10 min", metrics={"m": keep}))
+    assert expected == handed
 
 
 @pytest.mark.parametrize("period", ["1.5 s", "90 ms"])

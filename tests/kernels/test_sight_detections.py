@@ -448,6 +448,19 @@ def errors_of(draw: st.DrawFn, cameras: Sequence[slow.Eye], users: int) -> list[
     return [draw(st.one_of(st.none(), perceptions(eye.period, users))) for eye in cameras]
 
 
+def assert_same(
+    home: Home,
+    eye: slow.Eye | Sequence[slow.Eye],
+    scene: Scene,
+    first: int,
+    stops: tuple[bool, bool] = (False, False),
+) -> Seen:
+    """Compare what the kernel and its twin see, and return it."""
+    expected = looked_slowly(home, eye, scene, first, stops)
+    assert expected == looked(home, eye, scene, first, stops)
+    return expected
+
+
 @quick
 @given(homes(), eyes(), seeds(), st.integers(0, 3), st.integers(0, 10**9), stoppings)
 def test_look_equals_the_reference(
@@ -461,7 +474,7 @@ def test_look_equals_the_reference(
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), count)
 
-    assert looked_slowly(home, eye, scene, first, stops) == looked(home, eye, scene, first, stops)
+    assert_same(home, eye, scene, first, stops)
 
 
 @quick
@@ -475,9 +488,7 @@ def test_look_of_several_cameras_equals_the_reference(
 ) -> None:
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), count)
-    expected = looked_slowly(home, cameras, scene, 7, stops)
-
-    assert expected == looked(home, cameras, scene, 7, stops)
+    assert_same(home, cameras, scene, 7, stops)
 
 
 MOVES = st.sampled_from([0.05, 0.2, 0.5])
@@ -498,9 +509,7 @@ def test_look_at_bodies_that_mostly_rest_equals_the_reference(
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), 2, LONG, moves)
 
-    assert looked_slowly(home, cameras, scene, FIRST, stops) == looked(
-        home, cameras, scene, FIRST, stops
-    )
+    assert_same(home, cameras, scene, FIRST, stops)
 
 
 @quick
@@ -524,9 +533,7 @@ def test_look_past_bodies_that_hide_each_other_equals_the_reference(
     scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
     scene = replace(scene, thickness=thickness)
 
-    assert looked_slowly(home, cameras, scene, FIRST, stops) == looked(
-        home, cameras, scene, FIRST, stops
-    )
+    assert_same(home, cameras, scene, FIRST, stops)
 
 
 @pytest.mark.parametrize("moves", [0.1, 1.0])
@@ -535,9 +542,7 @@ def test_look_past_bodies_in_one_room_equals_the_reference(moves: float) -> None
     eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
     scene = scene_in(ROOM, np.random.default_rng(8), 6, 120, moves)
     scene = replace(scene, thickness=60)
-    expected = looked_slowly(ROOM, eyes_, scene, FIRST)
-
-    assert expected == looked(ROOM, eyes_, scene, FIRST)
+    expected = assert_same(ROOM, eyes_, scene, FIRST)
     assert (
         100 < len(expected.sightings) < len(looked(ROOM, eyes_, replace(scene, thickness=0), 0)[1])
     )
@@ -556,7 +561,7 @@ def test_look_over_furniture_and_bodies_equals_the_reference(
     scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
     scene = replace(scene, thickness=thickness, heights=seed + 1)
 
-    assert looked_slowly(home, cameras, scene, FIRST) == looked(home, cameras, scene, FIRST)
+    assert_same(home, cameras, scene, FIRST)
 
 
 @pytest.mark.slow
@@ -566,9 +571,7 @@ def test_look_over_furniture_in_one_room_equals_the_reference(thickness: int) ->
     eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
     scene = scene_in(ROOM, np.random.default_rng(8), 5, 60, 0.3)
     scene = replace(scene, thickness=thickness, heights=7)
-    expected = looked_slowly(ROOM, eyes_, scene, FIRST)
-
-    assert expected == looked(ROOM, eyes_, scene, FIRST)
+    expected = assert_same(ROOM, eyes_, scene, FIRST)
     flat = looked(ROOM, eyes_, replace(scene, heights=0), FIRST)
     assert 100 < len(expected.sightings)
     assert expected.places != flat.places
@@ -616,9 +619,7 @@ def test_look_of_cameras_that_err_equals_the_reference(
     errs = data.draw(errors_of(cameras, count))
     scene = replace(scene_in(home, rng, count, LONG, moves), perceptions=errs)
 
-    assert looked_slowly(home, cameras, scene, FIRST, stops) == looked(
-        home, cameras, scene, FIRST, stops
-    )
+    assert_same(home, cameras, scene, FIRST, stops)
 
 
 @quick
@@ -643,9 +644,7 @@ def test_look_by_another_method_equals_the_reference(
             shown[c, u] = rested(rng, np.where(rng.random(LONG) < 0.7, points[u], 0), moves)
     scene = replace(scene, shown=shown, perceptions=errs, thickness=thickness)
 
-    assert looked_slowly(home, cameras, scene, FIRST, stops) == looked(
-        home, cameras, scene, FIRST, stops
-    )
+    assert_same(home, cameras, scene, FIRST, stops)
 
 
 @quick
@@ -686,9 +685,7 @@ def test_look_in_one_room_equals_the_reference(degrees: int, detection: float) -
     eye = slow.Eye(0, 700, half_angle(degrees), round(detection * 2**53), 2)
     scene = scene_in(home, np.random.default_rng(degrees), 4, 150)
 
-    expected = looked_slowly(home, eye, scene, 1000)
-
-    assert expected == looked(home, eye, scene, 1000)
+    expected = assert_same(home, eye, scene, 1000)
     assert (detection > 0) == bool(expected.sightings)
 
 
@@ -717,9 +714,7 @@ def test_look_in_one_room_of_cameras_that_err_equals_the_reference(
     scene = scene_in(home, np.random.default_rng(per_track), 3, 150, 0.1)
     scene = replace(scene, perceptions=[errs, errs])
 
-    expected = looked_slowly(home, cameras, scene, FIRST)
-
-    assert expected == looked(home, cameras, scene, FIRST)
+    expected = assert_same(home, cameras, scene, FIRST)
     users = [row[2:4] for row in expected.sightings]
     assert min(users.count((u, u)) for u in range(3)) > 5
     assert len([1 for u, who in users if u >= 0 > who]) > 5

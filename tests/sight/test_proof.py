@@ -1,12 +1,11 @@
 """Sight in real homes, turned and mirrored, doors open and shut: the short form of the benchmark."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+from tests.scripts import script
 from tests.thorough import some
 
 import fleet2d
@@ -23,14 +22,7 @@ PLANS = {
 @pytest.fixture(scope="module")
 def proof() -> ModuleType:
     """The script that compares millions of pairs."""
-    path = Path(__file__).parents[2] / "benchmarks" / "sight_proof.py"
-    spec = importlib.util.spec_from_file_location("sight_proof", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["sight_proof"] = module
-    spec.loader.exec_module(module)
-    return module
+    return script("benchmarks/sight_proof.py")
 
 
 @pytest.mark.slow

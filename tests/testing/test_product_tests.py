@@ -3,15 +3,14 @@
 The mutants are behaviors with a seeded bug, see `mutants`.
 """
 
-import importlib.util
 import json
-import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from tests.scripts import script
 from tests.thorough import THOROUGH, some
 
 import fleet2d
@@ -26,13 +25,7 @@ WORSE = tomllib.loads((FOLDER / "worse.toml").read_text())
 
 @pytest.fixture(scope="module")
 def week() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("week", FOLDER / "test_week.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    sys.modules["week"] = module
-    specification.loader.exec_module(module)
-    return module
+    return script("examples/product_tests/test_week.py")
 
 
 def test_each_of_the_twelve_tests_has_a_worse_robot(week: ModuleType) -> None:

@@ -1,6 +1,6 @@
 """Questions to the page, against the tables of the run evaluated step by step."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import pytest
 import fleet2d
 from fleet2d.kernels import Bool
 
-from .browser import chromium, page_at
+from .browser import page_at
 from .test_browser import served
 
 HOURS = 30
@@ -173,12 +173,6 @@ QUESTIONS: dict[str, dict[str, Truth]] = {
         "Bob sleep": lambda s: s.doing("Bob", "sleep"),
     },
 }
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as started:
-        yield started
 
 
 def asked(page: Any, question: str) -> Any:

@@ -19,16 +19,10 @@ from fleet2d.viewing.live import LiveRun
 from fleet2d.viewing.page_data import PageData, embedded_run, export_html, html_of
 from fleet2d.viewing.page_server import PageServer
 
-from .browser import chromium, page_at
+from .browser import page_at
 
 ROOT = Path(__file__).parents[2]
 AXE = ROOT / "page" / "node_modules" / "axe-core" / "axe.min.js"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from tests.thorough import THOROUGH
 
 from fleet2d.viewing.page_server import PageServer
 
-from .browser import chromium, page_at
+from .browser import page_at
 
 PICTURES = Path(__file__).parent / "screenshots"
 SIZE = {"width": 1000, "height": 720}
@@ -35,12 +35,6 @@ VIEWS = {
     "two": f"#{AT}&panel=now",
 }
 ORDINARY = [("now", "light"), ("beliefs", "dark")]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")

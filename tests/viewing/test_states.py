@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
@@ -13,7 +12,7 @@ import fleet2d
 from fleet2d.viewing.page_data import export_html
 from fleet2d.viewing.page_server import PageServer
 
-from .browser import chromium, page_at
+from .browser import page_at
 from .test_browser import AXE, served, shown_clock, shown_step, until
 
 START = {"start": "2026-01-05", "duration": "2 d", "seed": 1}
@@ -23,12 +22,6 @@ PATROL = {"type": "patrol", "camera": {}}
 TEN = {f"r{number}": PATROL for number in range(10)}
 PAPER = {"extends": "bundled:paper"}
 LATE = {"duration": "2 d", "start": "2026-01-05T14:37:00", "seed": 1}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as started:
-        yield started
 
 
 STATES: dict[str, tuple[dict[str, Any], str, str]] = {

@@ -209,6 +209,13 @@ def test_a_forecast_does_not_change_with_later_evidence() -> None:
     assert before.tolist() == now.at(soon).with_away("u0").tolist()
 
 
+def late_loss(track: Any, where: np.ndarray) -> float:
+    """Return the mean log loss of where the first user is, from the eleventh day on."""
+    home, away = track.home[10 * DAY :, 0], track.away[10 * DAY :, 0]
+    belief = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
+    return float(log_loss(belief, where[10 * DAY :]).mean())
+
+
 @pytest.mark.slow
 def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
     """Log loss of the last 10 of 20 days of a Markov person, 4 runs; gaps are over 10 % of it."""
@@ -217,10 +224,7 @@ def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
         where = person(20 * DAY, 5, seed)
         bins = evidence(where, 5, patrol, seed)
         for cls, values in scores.items():
-            track = followed(cls(), bins, 5, 1, length=360).track
-            home, away = track.home[10 * DAY :, 0], track.away[10 * DAY :, 0]
-            belief = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
-            values.append(log_loss(belief, where[10 * DAY :]).mean())
+            values.append(late_loss(followed(cls(), bins, 5, 1, length=360).track, where))
     last, long_, markov, full = (np.mean(values) for values in scores.values())
     assert full < 0.9 * markov
     assert markov < 0.9 * long_
@@ -261,10 +265,7 @@ def test_models_with_hours_are_better_for_people_with_regular_hours() -> None:
         where = sleeper(20, seed)
         bins = evidence(where, 3, patrol, seed)
         for cls, values in scores.items():
-            track = followed(cls(), bins, 3, 1).track
-            home, away = track.home[10 * DAY :, 0], track.away[10 * DAY :, 0]
-            belief = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
-            values.append(log_loss(belief, where[10 * DAY :]).mean())
+            values.append(late_loss(followed(cls(), bins, 3, 1).track, where))
     assert np.mean(scores[RoutineModel]) < 0.9 * np.mean(scores[SemiMarkov])
 
 

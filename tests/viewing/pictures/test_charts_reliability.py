@@ -1,8 +1,7 @@
 """Reliability diagrams: forecasts and truth as stored, the same bytes, and other tables refused."""
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -77,16 +76,17 @@ def test_the_diagram_is_drawn_the_same_each_time(forecast_run: Any, tmp_path: Pa
     assert "likeliest place" in (tmp_path / "three.svg").read_text()
 
 
+@pytest.fixture
+def figure(monkeypatch: pytest.MonkeyPatch) -> Figure:
+    """The figure on which charts are drawn, which stays when its file is written."""
+    result = Figure()
+    monkeypatch.setattr(charts, "picture", lambda *_: nullcontext(result))
+    return result
+
+
 def test_both_panels_have_their_probabilities_at_the_same_places(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    figure: Figure, tmp_path: Path
 ) -> None:
-    figure = Figure()
-
-    @contextmanager
-    def kept(*_: object) -> Iterator[Figure]:
-        yield figure
-
-    monkeypatch.setattr(charts, "picture", kept)
     charts.draw_forecasts("rtp", np.eye(3), np.arange(3), tmp_path / "x.png")
     figure.draw_without_rendering()
     curve, counts = (axes.get_window_extent().intervalx for axes in figure.axes)
@@ -94,15 +94,8 @@ def test_both_panels_have_their_probabilities_at_the_same_places(
 
 
 def test_gaps_have_a_panel_for_each_measure_and_a_line_for_each_model(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    figure: Figure, tmp_path: Path
 ) -> None:
-    figure = Figure()
-
-    @contextmanager
-    def kept(*_: object) -> Iterator[Figure]:
-        yield figure
-
-    monkeypatch.setattr(charts, "picture", kept)
     gaps = {"0-1 min": (0.5, 0.4, 0.7), "over 4 h": (0.9, math.nan, math.nan)}
     charts.draw_gaps({"log loss": {"routine": gaps, "learned": gaps}}, tmp_path / "x.png")
 
