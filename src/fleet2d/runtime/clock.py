@@ -67,7 +67,7 @@ class Clock:
     steps: int
     sun: "Sun | None" = None
 
-    @property
+    @cached_property
     def zone(self) -> Zone | None:
         """The clock of the home, if it has a time zone."""
         return self.start.zone if isinstance(self.start, LocalTime) else None

@@ -8,6 +8,7 @@ components run, on other components, or on their draws.
 import hashlib
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -19,6 +20,7 @@ T = TypeVar("T")
 _LN2 = 0.6931471805599453
 
 
+@lru_cache(maxsize=1000)
 def stream_key(seed: int, path: str, purpose: str) -> np.uint64:
     """Return the key of a stream, e.g. ``stream_key(4, "users.ana", "spot")``.
 
