@@ -257,7 +257,7 @@ class Hangout(BeliefBehavior):
         self.penalty = self.places.block + SEAT_WEIGHT * self.places.prox
         self.ways: tuple[Space, dict[LatticePoint, F64]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
-        self.rated_by: F64 | None = None  # the probabilities behind `worth`
+        self.rated_by = b""  # the probabilities behind `worth`
         self.worth = -self.penalty
         self.place: int | None = None
         self.decides_at = actor.clock.start
@@ -330,12 +330,13 @@ class Hangout(BeliefBehavior):
 
     def _worth(self, joint: F64) -> F64:
         """Return the rating of each place but for its way, float64 (n,), by chances of rooms."""
-        if self.rated_by is None or not np.array_equal(joint, self.rated_by):
+        probabilities = joint.tobytes()
+        if probabilities != self.rated_by:
             gain = np.zeros(len(self.places.points))
             # Summed in a fixed order, unlike in a matrix product: the same on every machine.
             for room, chance in enumerate(joint.tolist()):
                 gain += chance * self.nearness[:, room]
-            self.rated_by = joint
+            self.rated_by = probabilities
             self.worth = gain - self.penalty
         return self.worth
 
