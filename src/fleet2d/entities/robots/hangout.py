@@ -68,7 +68,7 @@ class HangoutPlaces:
         The costs are `block`, how much it blocks ways, and `prox`, how near it is to a seat.
         """
         self.points, self.room = self._candidates(avoid)
-        seats = tuple(read_only(self._seats_of(room)) for room in self._actor.home.rooms)
+        seats = self._lay_out_seats()
         block = read_only(self._blocking())
         prox = read_only(self._proximity())
         return read_only(self.points), read_only(self.room), seats, block, prox
@@ -112,15 +112,23 @@ class HangoutPlaces:
             rooms = rooms[clear]
         return np.ascontiguousarray(points), rooms
 
-    def _seats_of(self, room: Room) -> I64:
-        """Return where people usually are in a room [lattice]: at its furniture, else all over."""
+    def _lay_out_seats(self) -> Seats:
+        """Return where people usually are in each room [lattice]: at its furniture, else all over.
+
+        Each place at furniture is looked up once, not for every room.
+        """
+        home = self._actor.home
+        uses: dict[int, list[tuple[float, float]]] = {}
+        for use in (use for thing in home.objects for use in thing.uses):
+            room = home.plan.room_at(use.x, use.y)
+            if room is not None:
+                uses.setdefault(room.index, []).append((use.x, use.y))
+        return tuple(
+            read_only(self._seats_of(room, uses.get(room.index, []))) for room in home.rooms
+        )
+
+    def _seats_of(self, room: Room, uses: list[tuple[float, float]]) -> I64:
         plan = self._actor.home.plan
-        uses = [
-            (use.x, use.y)
-            for thing in self._actor.home.objects
-            for use in thing.uses
-            if plan.room_at(use.x, use.y) == plan.rooms[room.index]
-        ]
         if uses:
             return np.ascontiguousarray(plan.lattice.to_lattice(uses))
         cells = cells_of(plan.room_of_cell == room.index)
