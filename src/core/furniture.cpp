@@ -77,7 +77,7 @@ public:
           group_(group),
           shape_(floor.holds.shape),
           holds_(empty_sums(floor.holds, occupied)),
-          whole_(empty_sums(floor.whole, occupied)),
+          whole_(group.front > 0 ? empty_sums(floor.whole, occupied) : Array<i32, 2>{}),
           extent_(extent_of(floor.holds)) {}
 
     // Append the places in the window turned by `turn`; returns the new number of places.
@@ -102,9 +102,10 @@ private:
         const auto is_full = [&](View<const i32, 2> sums, const CellBox& box) {
             return count_in(sums, unturned(box, turn, shape_)) == box.high * box.wide;
         };
-        return is_full(holds_.view(), {row, column, group_.depth, group_.width}) &&
-               is_full(whole_.view(), {row + group_.depth, column, group_.front, group_.width}) &&
-               before_wall(turn, turn, {row, column, 1, group_.width}) >= group_.backed;
+        // Most places of a group that needs a wall have none behind them.
+        return before_wall(turn, turn, {row, column, 1, group_.width}) >= group_.backed &&
+               is_full(holds_.view(), {row, column, group_.depth, group_.width}) &&
+               (group_.front == 0 || is_full(whole_.view(), {row + group_.depth, column, group_.front, group_.width}));
     }
 
     i64 points_at(int turn, i64 row, i64 column) const {

@@ -21,6 +21,7 @@ from fleet2d.floorplan.furniture_places import (
     DOOR_CLEARANCE,
     FurnitureGroup,
     RoomView,
+    cells_before_walls,
     whole_cells,
 )
 from fleet2d.floorplan.home import Home
@@ -184,7 +185,8 @@ def test_group_for_a_corner_is_tried_at_both_ends_of_every_wall() -> None:
     plan = one_room("bedroom")
     whole = whole_cells(plan)
     nothing = np.zeros_like(whole)
-    view = RoomView(plan, plan.rooms[0], whole, nothing)
+    before_walls = cells_before_walls(whole, plan.lattice.cell)
+    view = RoomView(plan, plan.rooms[0], whole, nothing, before_walls)
     group = FurnitureGroup(1.0, 0.5, (), front=0.6, corner=40, away=0)
     places = list(view.places(group, nothing, Draws(stream_key(1, "test", "corners"), 0)))
     corners = set()
@@ -203,7 +205,8 @@ def test_group_for_a_corner_is_tried_at_both_ends_of_every_wall() -> None:
 def test_group_is_tried_only_where_it_and_the_floor_before_it_are_empty() -> None:
     plan = one_room("bedroom")
     whole = whole_cells(plan)
-    view = RoomView(plan, plan.rooms[0], whole, np.zeros_like(whole))
+    before_walls = cells_before_walls(whole, plan.lattice.cell)
+    view = RoomView(plan, plan.rooms[0], whole, np.zeros_like(whole), before_walls)
     group = FurnitureGroup(1.4, 0.5, (), wall=False, front=0.9, corner=0, away=0)
     draws, turns = Draws(stream_key(1, "test", "empty"), 0), set()
     for seed in range(12):

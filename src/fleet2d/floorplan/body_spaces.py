@@ -177,10 +177,11 @@ def stays_whole(plan: FloorPlan, solid: Sequence[Polygon]) -> bool:
         False also where this can't tell.
     """
     free = shapely.difference(MultiPolygon(plan.polygons), shapely.union_all(solid))
-    for ring in shapely.get_rings(shapely.get_parts(free)):
-        along = np.diff(shapely.get_coordinates(ring), axis=0)
-        if (along != 0).all(axis=1).any():
-            return False
+    rings = shapely.get_rings(shapely.get_parts(free))
+    corners, ring_of = shapely.get_coordinates(rings, return_index=True)
+    is_slanted = (corners[1:] != corners[:-1]).all(axis=1)
+    if (is_slanted & (ring_of[1:] == ring_of[:-1])).any():
+        return False
     unit = plan.lattice.units_per_m
     for radius in RADII:
         space = free.buffer(-radius * unit - ROUNDED, join_style="mitre", mitre_limit=1.0)

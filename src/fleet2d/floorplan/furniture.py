@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from shapely import Polygon
+import shapely
 
 from fleet2d.configuration.problems import check_known
 from fleet2d.errors import FloorPlanError
@@ -208,4 +208,6 @@ def stand_furniture(
         facing = float(in_radians((heading + use.facing) % TURN))
         uses.append(UsePlace(x, y, facing, use.posture))
     facing = float(in_radians(heading % TURN))
-    return PlacedObject(name, kind, Polygon(corners), model.blocks, tuple(uses), facing)
+    # Quicker than the constructor, which furnishing calls for each piece that it tries.
+    footprint = shapely.polygons(corners)
+    return PlacedObject(name, kind, footprint, model.blocks, tuple(uses), facing)

@@ -32,6 +32,7 @@ from fleet2d.floorplan.space import (
     with_approaches,
 )
 from fleet2d.kernels import (
+    I32,
     I64,
     QUARTER,
     TURN,
@@ -112,7 +113,9 @@ class RoomView:
     cells.
     """
 
-    def __init__(self, plan: FloorPlan, room: Room, whole: Bool, doors: Bool) -> None:
+    def __init__(
+        self, plan: FloorPlan, room: Room, whole: Bool, doors: Bool, before_walls: I32
+    ) -> None:
         lattice = plan.lattice
         self.room = room
         self.lattice = lattice
@@ -125,15 +128,14 @@ class RoomView:
         self.pocket = int(POCKET_M2 / lattice.cell**2)
         whole = np.ascontiguousarray(whole[self.window])
         doors = doors[self.window]
-        reach = max(1, count_cells(lattice.cell, WALL_REACH))
-        # Cells before walls, in the direction of the rows of each turn: the wall on the left of a
-        # turn is behind the next one.
-        ahead = ((reach, 0), (-reach, 1), (-reach, 0), (reach, 1))
+        # Doors beyond the window don't count, and neither does its edge.
+        apart = np.ones((doors.shape[0] + 2, doors.shape[1] + 2), np.bool_)
+        apart[1:-1, 1:-1] = ~doors
         self._floor = RoomFloor(
             holds=whole & self.inside & ~doors,
             whole=whole,
-            before_walls=np.stack([corner_sums(cells_after(~whole, *way)) for way in ahead]),
-            from_doors=squared_distance(np.pad(~doors, 1, constant_values=True))[1:-1, 1:-1],
+            before_walls=np.ascontiguousarray(before_walls[:, y0 : y1 + 1, x0 : x1 + 1]),
+            from_doors=squared_distance(apart)[1:-1, 1:-1],
         )
 
     def places(
@@ -206,14 +208,18 @@ class RoomView:
             ends = ((column + u0, row + v0), (column + u1, row + v1))
             # The back is at the bottom: away from it is +y before turning.
             heading = (QUARTER * (turn + piece.turn + 1)) % TURN
-            corners = np.array([self._unturned(turn, *end) for end in ends]) * UNITS_PER_CELL
-            (ax, ay), (bx, by) = self.lattice.to_metres(corners).tolist()
+            (ax, ay), (bx, by) = (self._corner_m(turn, *end) for end in ends)
             size = (abs(bx - ax), abs(by - ay))
             if heading % (2 * QUARTER) == 0:
                 size = size[::-1]
             middle = ((ax + bx) / 2, (ay + by) / 2)
             objects.append(stand_furniture(piece.type, middle, heading, size))
         return objects
+
+    def _corner_m(self, turn: int, u: int, v: int) -> tuple[float, float]:
+        """Return a corner of a cell of the turned window in the plan [m]."""
+        x, y = self._unturned(turn, u, v)
+        return self.lattice.xy_of(x * UNITS_PER_CELL, y * UNITS_PER_CELL)
 
     def _unturned(self, turn: int, u: int, v: int) -> tuple[int, int]:
         """Return a corner of a cell (x, y) of the turned window as one of the plan."""
@@ -246,6 +252,21 @@ def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
     return out
 
 
+def cells_before_walls(whole: Bool, cell: float) -> I32:
+    """Return how many cells are before walls, as `RoomFloor` has them, of a whole plan.
+
+    In the direction of the rows of each turn: the wall on the left of a turn is behind the next.
+
+    Args:
+        whole: The free cells that no wall cuts, bool (rows, columns).
+        cell: Their side [m].
+    """
+    reach = max(1, count_cells(cell, WALL_REACH))
+    ahead = ((reach, 0), (-reach, 1), (-reach, 0), (reach, 1))
+    walls = ~whole
+    return np.stack([corner_sums(cells_after(walls, *way)) for way in ahead])
+
+
 DOOR_CLEARANCE = 0.9
 """Depth of the floor before a doorway that stays empty, on either side [m]."""
 
@@ -269,6 +290,7 @@ class Interior:
         self.whole = whole_cells(plan)
         self.doors = door_cells(plan, self.standing)
         self.occupied = np.zeros_like(self.whole)
+        self._before_walls = cells_before_walls(self.whole, plan.lattice.cell)
         self._views: dict[int, RoomView] = {}
         self._main: dict[int, Bool] = {}
         self._approached = np.zeros_like(self.whole)
@@ -304,7 +326,9 @@ class Interior:
     def view(self, room: Room) -> RoomView:
         """Return the view of a room."""
         if room.index not in self._views:
-            self._views[room.index] = RoomView(self.plan, room, self.whole, self.doors)
+            self._views[room.index] = RoomView(
+                self.plan, room, self.whole, self.doors, self._before_walls
+            )
         return self._views[room.index]
 
     def remove_obstructions(self) -> None:
@@ -389,8 +413,9 @@ class Interior:
         """Return the objects with reachable places to use them, or None if one has none."""
         usable = []
         everything = [*self.objects, *things]
+        reached = self._reached(view)
         for thing in things:
-            reachable = with_approaches(self.plan, thing, self._reached(view), everything)
+            reachable = with_approaches(self.plan, thing, reached, everything)
             if thing.uses and not reachable.uses:
                 return None
             usable.append(reachable)
