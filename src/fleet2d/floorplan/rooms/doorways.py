@@ -178,8 +178,9 @@ def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], 
     if index is None:
         return None
     far = (0.5 + reach / length) * along
+    outline = shapely.get_coordinates(shapely.get_rings(walls[index]), return_index=True)
     jambs = [
-        _jamb(walls[index], middle, end, middle + side * far)
+        _jamb(*outline, middle, end, middle + side * far)
         for end, side in zip(ends, (-1, 1), strict=True)
     ]
     if jambs[0] is None or jambs[1] is None or jambs[0] == jambs[1]:
@@ -197,19 +198,24 @@ def _fit(walls: list[Polygon], ends: F64, reach: float) -> tuple[list[Polygon], 
     return changed, line
 
 
-def _jamb(polygon: Polygon, start: F64, end: F64, far: F64) -> tuple[int, int] | None:
+def _jamb(corners: F64, ring_of: I64, start: F64, end: F64, far: F64) -> tuple[int, int] | None:
     """Return the even lattice point where the way from `start` by `end` to `far` meets a wall.
 
     A way that passes beside the corner at `end`, as along a slanted wall, ends there.
+
+    Args:
+        corners: The corners of all rings of the polygon, float64 (n, 2).
+        ring_of: The ring of each, int64 (n,).
+        start: The middle of the doorway.
+        end: Its end.
+        far: The farthest point at which it may end.
     """
-    corners, ring_of = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
     begins = corners[:-1]
     ends = corners[1:]
     least, most = np.minimum(start, far), np.maximum(start, far)
     is_near = ((np.minimum(begins, ends) <= most) & (np.maximum(begins, ends) >= least)).all(axis=1)
     is_near &= ring_of[:-1] == ring_of[1:]
-    sides = shapely.linestrings(np.stack([begins[is_near], ends[is_near]], axis=1))
-    hits = shapely.get_coordinates(shapely.intersection(sides, LineString([start, far])))
+    hits = _crossings(begins[is_near], ends[is_near], start, far)
     nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))] if len(hits) else end
     away = np.maximum(*np.abs(corners - nearest).T)
     if away.min() <= CORNER_DISTANCE:
@@ -219,6 +225,16 @@ def _jamb(polygon: Polygon, start: F64, end: F64, far: F64) -> tuple[int, int] |
     else:
         x, y = (2 * np.rint(nearest / 2)).tolist()
     return int(x), int(y)
+
+
+def _crossings(begins: F64, ends: F64, start: F64, far: F64) -> F64:
+    """Return where the way from `start` to `far` meets walls whose boxes overlap its own."""
+    is_level = start == far
+    if is_level.any() and (begins == ends)[:, ~is_level].all():
+        # The way is parallel to an axis, and all walls are at a right angle to it.
+        return np.where(is_level, start, begins)
+    sides = shapely.linestrings(np.stack([begins, ends], axis=1))
+    return shapely.get_coordinates(shapely.intersection(sides, LineString([start, far])))
 
 
 def _with_corner(polygon: Polygon, point: F64) -> tuple[Polygon, bool]:
