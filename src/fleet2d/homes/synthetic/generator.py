@@ -384,15 +384,18 @@ def outline_corners(boxes: Sequence[Box]) -> list[bool]:
     union = shapely.union_all([shapely.box(b.x0, b.y0, b.x1, b.y1) for b in boxes])
     if not isinstance(union, shapely.Polygon) or union.interiors:
         return []
-    half = MIN_COURT / 2
-    closed = union.buffer(half, join_style="mitre").buffer(-half, join_style="mitre")
-    if closed.area > union.area + 1:
-        return []
     ring = shapely.get_coordinates(shapely.orient_polygons(union))[:-1]
     into = ring - np.roll(ring, 1, axis=0)
     out = np.roll(ring, -1, axis=0) - ring
     turns = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
-    return list(turns[turns != 0] > 0)
+    is_left = turns[turns != 0] > 0
+    # Between two walls there is a crack only if the outline turns right at both of its ends.
+    if np.count_nonzero(~is_left) > 1:
+        half = MIN_COURT / 2
+        closed = union.buffer(half, join_style="mitre").buffer(-half, join_style="mitre")
+        if closed.area > union.area + 1:
+            return []
+    return list(is_left)
 
 
 def outline_kind(turns: Sequence[bool]) -> str | None:

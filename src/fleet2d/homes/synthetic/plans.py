@@ -232,6 +232,7 @@ class Sketch:
             MisfitError: No try fits.
         """
         entry, closet = (self.entry, self.closet) if is_main else (None, None)
+        limits = limits_of(self.briefs)
         for _ in range(TRIES):
             suite = closet is None and self.choices.chance(55)
             sides = self._sides(groups, entry, suite)
@@ -246,7 +247,7 @@ class Sketch:
                 for percent in (78, 90, 102, 114)
             ]
             wing = Wing(fore, aft, corridor)
-            depth = wing.squarest_depth(self.gross, depths, limits_of(self.briefs))
+            depth = wing.squarest_depth(self.gross, depths, limits)
             if depth is not None:
                 return replace(wing, back_depth=depth)
         raise MisfitError
@@ -482,9 +483,10 @@ class Sketch:
         low = max(strip_areas) / MAX_DEPTH
         high = min(strip_areas) / MIN_DEPTH
         ratios = [r for r in LENGTH_RATIOS if low <= sqrt(total * r / 100) <= high]
+        limits = limits_of(self.briefs)
         for ratio in choices.shuffled(ratios)[:TRIES]:
             with suppress(MisfitError):
-                if are_promising(place(ratio, self.gross), self.briefs):
+                if are_promising(place(ratio, self.gross), limits):
                     return partial(place, ratio)
         raise MisfitError
 
@@ -629,11 +631,12 @@ def _place_at_scale(sketch: Sketch, placing: Placing) -> RoomLayout:
     """Place the rooms at the scale at which their clear areas add up to the requested area."""
     briefs = sketch.briefs
     target = sketch.request.area_m2 * UNITS_PER_M2 * ROOMS_SHARE
+    limits = limits_of(briefs)
     factor = 1.0
     for _ in range(ROUNDS):
         areas = np.array([gross_area(b.area * factor) if b.area else 0.0 for b in briefs])
         boxes = placing(areas)
-        if not are_promising(boxes, briefs):
+        if not are_promising(boxes, limits):
             break
         area = sum_in_order(box.clear_area for box in boxes)
         if abs(area - target) <= TOLERANCE * target:

@@ -416,9 +416,14 @@ class LayoutRequest:
     outline: str | None
 
 
-def are_promising(boxes: Sequence[Box], briefs: Sequence[Brief]) -> bool:
-    """Return whether the rooms could fit at another scale: none is far too narrow or too long."""
-    return is_promising(np.array(boxes, np.int64), limits_of(briefs))
+def are_promising(boxes: Sequence[Box], limits: F64) -> bool:
+    """Return whether the rooms could fit at another scale: none is far too narrow or too long.
+
+    Args:
+        boxes: The rooms.
+        limits: What `limits_of` returns.
+    """
+    return is_promising(np.array(boxes, np.int64), limits)
 
 
 def limits_of(briefs: Sequence[Brief]) -> F64:
