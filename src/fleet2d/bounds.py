@@ -5,6 +5,7 @@ the environment variable that raises the bound.
 """
 
 import os
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -189,6 +190,19 @@ def _width_of(kind: Any) -> int:
         return max(1, int(kind.bit_width) // 8)
     except ValueError:  # the offset of a text or a list
         return 4
+
+
+def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object by its keys and values, as `object_pairs_hook` of `json` gets them.
+
+    Raises:
+        ValueError: It has a key twice: `json` would keep the second value and drop the first.
+    """
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        [(repeated_key, _)] = Counter(key for key, _ in pairs).most_common(1)
+        raise ValueError(f"the key {one_line(repeated_key)!r} is given twice in an object")
+    return result
 
 
 def one_line(value: object, most: int = 60) -> str:

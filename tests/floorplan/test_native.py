@@ -167,7 +167,7 @@ def test_a_key_that_is_there_twice_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(PLAN)[:-1] + ', "version": 1}')
 
-    with pytest.raises(FloorPlanError, match="the key 'version' is there twice"):
+    with pytest.raises(FloorPlanError, match="the key 'version' is given twice"):
         load_floorplan(path)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fleet2d.artifacts.table import Kind, TableSpec
-from fleet2d.bounds import FILE_BYTES, read_bytes
+from fleet2d.bounds import FILE_BYTES, read_bytes, unique_keys
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import parse_duration
 from fleet2d.errors import RunDirectoryError, printable
@@ -83,26 +83,17 @@ def read_json(text: bytes) -> Any:
         {'steps': 3}
         >>> read_json(b'{"steps": 3, "steps": 4}')
         Traceback (most recent call last):
-        ValueError: the key 'steps' is given twice
+        ValueError: the key 'steps' is given twice in an object
     """
     try:
         return json.loads(
             text.decode(),
-            object_pairs_hook=_unique_keys,
+            object_pairs_hook=unique_keys,
             parse_constant=_refuse_constant,
             parse_float=_finite_float,
         )
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    content = dict(pairs)
-    if len(content) < len(pairs):
-        keys = [key for key, _ in pairs]
-        repeated_key = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {repeated_key[:60]!r} is given twice")
-    return content
 
 
 def _refuse_constant(word: str) -> NoReturn:

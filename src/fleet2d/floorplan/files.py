@@ -22,7 +22,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from fleet2d.bounds import FILE_BYTES, JSON_VALUES, Bound, one_line, read_bytes
+from fleet2d.bounds import FILE_BYTES, JSON_VALUES, Bound, one_line, read_bytes, unique_keys
 from fleet2d.configuration.components import DescribedModel
 from fleet2d.configuration.problems import Location, problem, suggest
 from fleet2d.errors import Fleet2DError, FloorPlanError, InputError, errors_as
@@ -118,7 +118,7 @@ def parse_json(content: bytes, path: Path, *, unique: bool = False) -> dict[str,
     values = text.count(",") + text.count("[") + text.count("{")
     JSON_VALUES.check(values, path, FloorPlanError, prefix="about ")
     try:
-        document = json.loads(text, object_pairs_hook=_unique_keys if unique else None)
+        document = json.loads(text, object_pairs_hook=unique_keys if unique else None)
     except json.JSONDecodeError as error:
         _refuse_foreign(path, text[:4096].encode())
         raise FloorPlanError(
@@ -129,16 +129,6 @@ def parse_json(content: bytes, path: Path, *, unique: bool = False) -> dict[str,
         reason = "it has lists in lists without end" if is_deep else error
         raise FloorPlanError(f"{path} is not a floor plan: {reason}") from None
     return _mapping(document, path, "a JSON object {…}")
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object, whose second value of a key would replace the first one."""
-    result = dict(pairs)
-    if len(result) < len(pairs):
-        keys = [key for key, _ in pairs]
-        twice = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {one_line(twice)!r} is there twice in an object")
-    return result
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from fleet2d.bounds import one_line
 from fleet2d.logs.layouts import aras, home_assistant, kasteren, mit, openshs, states
 from fleet2d.logs.layouts.casas import read_casas, shows_casas
-from fleet2d.logs.layouts.clock import by_clock
+from fleet2d.logs.layouts.clock import placed_in_order
 from fleet2d.logs.layouts.intervals import is_leaving, label_by_activities
 from fleet2d.logs.log import (
     AWAY,
@@ -220,9 +220,8 @@ def read_uci_adl(path: Path, *, sort: bool = False, zone: Zone | None = None) ->
     parts: dict[str, list[Reading]] = {"sensors": [], "activities": []}
     for kind, (file, rows) in files.items():
         readings = [row.reading(first_day) for row in rows]
-        readings, clock_notes = by_clock(readings, first_day, zone, file)
-        parts[kind], order_notes = in_order(readings, file, sort=sort)
-        notes += [f"{file.name}: {note}" for note in [*clock_notes, *order_notes]]
+        parts[kind], of_file = placed_in_order(readings, first_day, zone, file, sort=sort)
+        notes += [f"{file.name}: {note}" for note in of_file]
     readings = parts["activities"]
     if parts["sensors"]:
         readings = label_by_activities(parts["sensors"], readings)

@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fleet2d.bounds import one_line
-from fleet2d.logs.layouts.clock import by_clock
+from fleet2d.logs.layouts.clock import placed_in_order
 from fleet2d.logs.log import (
     ActivityLog,
     LogError,
     Reading,
-    in_order,
     log_lines,
     parse_local_time,
     since,
@@ -113,9 +112,7 @@ def read_casas(path: Path, *, sort: bool = False, zone: Zone | None = None) -> A
     if not readings:
         words = f", got {values}" if others else ""
         raise LogError(f"{path}: no sensor switches on in it; expected ON and OFF{words}")
-    readings, notes = by_clock(readings, first_day, zone, path)
-    readings, order_notes = in_order(readings, path, sort=sort)
-    notes += order_notes
+    readings, notes = placed_in_order(readings, first_day, zone, path, sort=sort)
     if others:
         notes.append(f"{others.total()} lines are neither ON nor OFF and left out: {values}")
     if under_way:

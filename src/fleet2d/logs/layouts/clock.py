@@ -6,9 +6,21 @@ from pathlib import Path
 import numpy as np
 
 from fleet2d.errors import errors_as
-from fleet2d.logs.log import LogError, Reading
+from fleet2d.logs.log import LogError, Reading, in_order
 from fleet2d.logs.times import moments_in_file
 from fleet2d.runtime.local_time import Zone, wall_us
+
+
+def placed_in_order(
+    readings: list[Reading], first_day: date | None, zone: Zone | None, path: Path, *, sort: bool
+) -> tuple[list[Reading], list[str]]:
+    """Return readings by the clock of the home, in the order in which they begin, and notes.
+
+    See `by_clock` and `in_order` for the arguments and for what is raised.
+    """
+    placed, clock_notes = by_clock(readings, first_day, zone, path)
+    ordered, order_notes = in_order(placed, path, sort=sort)
+    return ordered, clock_notes + order_notes
 
 
 def by_clock(

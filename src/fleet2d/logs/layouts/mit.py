@@ -19,9 +19,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from fleet2d.bounds import one_line
-from fleet2d.logs.layouts.clock import by_clock
+from fleet2d.logs.layouts.clock import placed_in_order
 from fleet2d.logs.layouts.intervals import is_leaving
-from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order, log_lines, since
+from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, log_lines, since
 from fleet2d.runtime.local_time import Zone
 
 HEAD = re.compile(
@@ -58,9 +58,7 @@ def read_mit(path: Path, *, sort: bool = False, zone: Zone | None = None) -> Act
             at_us = since(first_day, time)
             readings.append(Reading(at_us, at_us, rooms.get(number, name), activity, line))
     # Within a block sensors are in no order, and blocks are in that of activities.
-    ordered, notes = by_clock(sorted(readings), first_day, zone, file)
-    ordered, order_notes = in_order(ordered, file, sort=sort)
-    notes += order_notes
+    ordered, notes = placed_in_order(sorted(readings), first_day, zone, file, sort=sort)
     return ActivityLog(path, "mit", first_day, tuple(ordered), tuple(notes))
 
 

@@ -11,14 +11,13 @@ import re
 from pathlib import Path
 
 from fleet2d.bounds import one_line
-from fleet2d.logs.layouts.clock import by_clock
+from fleet2d.logs.layouts.clock import placed_in_order
 from fleet2d.logs.layouts.intervals import is_leaving
 from fleet2d.logs.log import (
     AWAY,
     ActivityLog,
     LogError,
     Reading,
-    in_order,
     log_lines,
     parse_local_time,
     since,
@@ -74,9 +73,7 @@ def read_openshs(path: Path, *, sort: bool = False, zone: Zone | None = None) ->
             elif before is not None and is_on != before[number]:
                 readings.append(reading)
         before = states
-    readings, notes = by_clock(readings, first_day, zone, path)
-    readings, order_notes = in_order(readings, path, sort=sort)
-    notes += order_notes
+    readings, notes = placed_in_order(readings, first_day, zone, path, sort=sort)
     assert first_day is not None  # else there is no reading, which is an error
     return ActivityLog(path, "openshs", first_day, tuple(readings), tuple(notes))
 
