@@ -43,17 +43,24 @@ LATE = TableSpec("late", (Column("step", "step"), Column("what", "category", nul
 
 
 def begin_run(directory: Path, commits: int = 5, **options: Any) -> RunStore:
-    """A run that commits every hundred rows, and then goes on with rows that it doesn't commit."""
+    """A run that commits every hundred rows."""
     store = RunStore(directory, [EVERY_KIND], **options)
     store.open()
+    commit_rows(store, commits)
+    return store
+
+
+def commit_rows(store: RunStore, commits: int) -> list[Any]:
+    """Commit every hundred rows; return where each commit ends."""
+    ends = []
     for k in range(commits):
         store.append("every_kind", **part(ROWS, 100 * k, 100 * k + 100))
         if k == 2:
             store.add_table(LATE)
         if k >= 2:
             store.append("late", step=[k], what=[None if k % 2 else f"word {k}"])
-        store.commit(k)
-    return store
+        ends.append(store.commit(k))
+    return ends
 
 
 def test_a_journal_that_begins_again_describes_its_tables_again(tmp_path: Path) -> None:
@@ -119,16 +126,9 @@ def test_a_killed_run_reads_up_to_its_last_commit(tmp_path: Path, flush_rows: in
 @pytest.mark.parametrize("undone", [0, 2])
 def test_a_store_goes_on_behind_a_commit(tmp_path: Path, flush_rows: int, undone: int) -> None:
     expected = begin_run(None, flush_rows=flush_rows).close()  # type: ignore[arg-type]
-    ends = []
     store = RunStore(tmp_path / "run", [EVERY_KIND], flush_rows=flush_rows)
     store.open()
-    for k in range(5):
-        store.append("every_kind", **part(ROWS, 100 * k, 100 * k + 100))
-        if k == 2:
-            store.add_table(LATE)
-        if k >= 2:
-            store.append("late", step=[k], what=[None if k % 2 else f"word {k}"])
-        ends.append(store.commit(k))
+    ends = commit_rows(store, 5)
     unfinished = UnfinishedRun(kill(store))
     unfinished.lock()
     commit = ends[4 - undone]

@@ -2,7 +2,6 @@
 
 import json
 import socket
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -12,7 +11,6 @@ import yaml
 from tests.studies.scenes import base
 
 import fleet2d as package
-from fleet2d import cli
 from fleet2d.configuration.trust import (
     UntrustedCodeError,
     code_lines,
@@ -46,11 +44,8 @@ class Count(fleet2d.Algorithm):
 
 
 @pytest.fixture
-def fleet2d(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Cli:
+def fleet2d(fleet2d: Cli) -> Cli:
     """The command line in a folder with a scenario, a study and a search with code of their own."""
-    monkeypatch.chdir(tmp_path)
     Path("mine.py").write_text(CODE)
     home = base(algorithms={"count": {"type": "mine:Count", "period": "1 min"}})
     home["users"]["ana"]["type"] = "mine:Walk"
@@ -66,14 +61,7 @@ def fleet2d(
     tuned = {**study, "axes": {"robots.astro.speed": [0.3, 0.6]}, "tune": search}
     Path("search.yaml").write_text(yaml.safe_dump(tuned))
 
-    def call(*arguments: str) -> Result:
-        monkeypatch.setattr(sys, "argv", ["fleet2d", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        out, err = capsys.readouterr()
-        return int(caught.value.code or 0), out, err
-
-    return call
+    return fleet2d
 
 
 SERIAL = ("--executor", "serial")

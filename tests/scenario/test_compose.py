@@ -83,6 +83,11 @@ def test_composition_leaves_its_source_as_it_was() -> None:
          "there is none of this name: did you mean 'ana'? There are: ana, ben"),
         ("robots.astro.behaviors.2.dwell=1", "there is no robots.astro.behaviors.2: the list has "
                                              "2 entries, and the first is 0"),
+        ("robots.asto.speed=0.3", "override 'robots.asto.speed=0.3': there is no robots.asto: did "
+         "you mean 'astro'? There are: astro; to add one give robots.asto.type, too"),
+        ("users.anna.camera.range=[0, 3]", "there is no users.anna: did you mean 'ana'?"),
+        ("algorithms.cuont.margin=1", "did you mean 'count'? There are: count;"),
+        ("metrics.tally.of=x", "there is no metrics.tally. There are: none; to add one"),
     ],
 )  # fmt: skip
 def test_override_that_makes_no_sense_is_refused(override: str, message: str) -> None:
@@ -225,22 +230,6 @@ def test_name_is_not_inherited(tmp_path: Path) -> None:
     assert "name" not in compose(tmp_path / "home.yaml").data
     assert "mine" == compose(tmp_path / "own.yaml").data["name"]
     assert "base" == compose(tmp_path / "base.yaml", ["users.ana.sigma=1"]).data["name"]
-
-
-@pytest.mark.parametrize(
-    ("override", "message"),
-    [
-        ("robots.asto.speed=0.3", "override 'robots.asto.speed=0.3': there is no robots.asto: did "
-         "you mean 'astro'? There are: astro; to add one give robots.asto.type, too"),
-        ("users.anna.camera.range=[0, 3]", "there is no users.anna: did you mean 'ana'?"),
-        ("algorithms.cuont.margin=1", "did you mean 'count'? There are: count;"),
-        ("metrics.tally.of=x", "there is no metrics.tally. There are: none; to add one"),
-    ],
-)  # fmt: skip
-def test_override_inside_an_entry_that_is_not_there_is_refused(override: str, message: str) -> None:
-    with pytest.raises(ScenarioError) as caught:
-        compose(BASE, [override])
-    assert message in str(caught.value)
 
 
 def test_setting_inside_an_entry_that_is_not_there_is_refused() -> None:

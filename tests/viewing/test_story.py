@@ -86,30 +86,25 @@ def test_who_is_seen_by_one_of_two_robots_is_in_view() -> None:
     assert story["The longest out of view"]["words"].endswith("for 1 h 0 min")
 
 
-def test_who_gets_up_at_night_does_not_go_to_bed_later() -> None:
-    story = told(
-        (22.5, "ana", "activity", None, "sleep"),
-        (28, "ana", "activity", None, "toilet"),
-        (28.1, "ana", "activity", None, "sleep"),
-        (31, "ana", "activity", None, "breakfast"),
-        (47.75, "ana", "activity", None, "sleep"),
-        (55, "ana", "activity", None, "breakfast"),
-    )
+@pytest.mark.parametrize(
+    ("hours", "bed"),
+    [
+        pytest.param(
+            {22.5: "sleep", 28: "toilet", 28.1: "sleep", 31: "breakfast",
+             47.75: "sleep", 55: "breakfast"},
+            "23:45", id="getting up at night",
+        ),
+        pytest.param(
+            {21: "sleep", 21.5: "tv", 23.25: "sleep", 31: "breakfast",
+             46: "sleep", 55: "breakfast"},
+            "23:15", id="a nap in the evening",
+        ),
+    ],
+)  # fmt: skip
+def test_one_goes_to_bed_once_a_night(hours: dict[float, str], bed: str) -> None:
+    story = told(*((hour, "ana", "activity", None, what) for hour, what in hours.items()))
 
-    assert "Ana goes to bed at 23:45" == story["The latest night"]["words"]
-
-
-def test_nap_in_the_evening_is_not_a_night() -> None:
-    story = told(
-        (21, "ana", "activity", None, "sleep"),
-        (21.5, "ana", "activity", None, "tv"),
-        (23.25, "ana", "activity", None, "sleep"),
-        (31, "ana", "activity", None, "breakfast"),
-        (46, "ana", "activity", None, "sleep"),
-        (55, "ana", "activity", None, "breakfast"),
-    )
-
-    assert "Ana goes to bed at 23:15" == story["The latest night"]["words"]
+    assert f"Ana goes to bed at {bed}" == story["The latest night"]["words"]
 
 
 def test_bed_after_midnight_is_later_than_before() -> None:
