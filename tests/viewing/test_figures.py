@@ -96,6 +96,25 @@ def test_film_of_pictures_is_written(run_dir: Path, tmp_path: Path, ending: str)
     assert [target] == list(tmp_path.iterdir())
 
 
+def test_the_pictures_of_a_film_look_as_they_were_drawn(run_dir: Path, tmp_path: Path) -> None:
+    av = pytest.importorskip("av", reason="PyAV is not installed")
+    run = fleet2d.open_run(run_dir)
+    target = tmp_path / "film.mp4"
+    write_film(run, target, 25_200, 25_500, speed=250, height=240)
+    stage = stage_of(run, 25_200, 25_500, stride=10, height=240)
+    drawn = {
+        moment: pixels[..., :3].mean(axis=2)
+        for moment, pixels in draw_frames(stage, 25_200, np.flatnonzero(stage.changes()))
+    }
+    with av.open(str(target)) as film:
+        for picture in film.decode(video=0):
+            moment = round(picture.time * 25)
+            grey = picture.to_ndarray(format="rgb24").mean(axis=2)
+            if moment in drawn:
+                assert np.sqrt(((grey - drawn.pop(moment)) ** 2).mean()) < 3
+    assert not drawn
+
+
 @pytest.mark.slow
 def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir: Path, tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="PyAV is not installed")
