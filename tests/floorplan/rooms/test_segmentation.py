@@ -52,6 +52,24 @@ def test_corridor_goes_on_past_the_doors_on_either_side(width: float, found: lis
     assert found == areas(segment_rooms(both, [False], [width], CELL))
 
 
+@pytest.mark.parametrize(
+    ("leads_on", "found"), [(True, [18.0, 9.0, 8.0]), (False, [12.0, 9.0, 8.0, 6.0])]
+)
+def test_corridor_that_leads_on_stays_one_where_it_gets_wider(
+    leads_on: bool, found: list[float]
+) -> None:
+    """A dead end that is open all along its front is a room of its own."""
+    of_cell = np.full((20, 300), -1, np.int32)
+    of_cell[5:15, :90] = 0
+    of_cell[5:15, 90:150] = 1
+    of_cell[:, 150:210] = 2
+    of_cell[5:15, 210:290] = 3
+    door = Link(0, (0, 1) if leads_on else (0, 3))
+    four = Chambers(of_cell, 4, (door, Link(1, (1, 2)), Link(2, (2, 3))))
+
+    assert found == areas(segment_rooms(four, [False] * 3, [0.8, 0.95, 0.8], CELL))
+
+
 def test_legs_of_chairs_make_no_room_seem_a_corridor() -> None:
     """Among them no disc is wider than the doorway, which would lie across a corridor."""
     both = chambers(9.0, 6.0, links=(Link(0, (0, 1)),))

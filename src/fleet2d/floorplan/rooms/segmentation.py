@@ -23,7 +23,7 @@ from shapely import Polygon
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
 from fleet2d.floorplan.rooms.doorways import MIN_APART_M
-from fleet2d.floorplan.rooms.shape import by_size, without_furniture
+from fleet2d.floorplan.rooms.shape import LONG, by_size, without_furniture
 from fleet2d.kernels import (
     F64,
     I32,
@@ -563,7 +563,8 @@ WIDE_SHARE = 1.1
 is behind it is the same corridor or hall, past a column, a niche or a cupboard."""
 ACROSS_SHARE = 0.85
 """A passage that is wider than this share of the wider space beside it lies across a corridor,
-between the doors on either side."""
+between the doors on either side. So does one that is wider than this share of the narrower space,
+if that is as long as a corridor and both lead on: a corridor that gets wider stays one."""
 
 
 def segment_rooms(
@@ -590,13 +591,18 @@ def segment_rooms(
     owner = np.arange(chambers.count)
     while True:
         candidates = []
+        pairs = {frozenset(owner[[*link.chambers]].tolist()) for link in chambers.links}
+        borders = [pair for pair in pairs if len(pair) == 2]
         for link in chambers.links:
             one, other = (int(owner[chamber]) for chamber in link.chambers)
             opening = is_opening[link.line]
             width = widths_m[link.line]
-            narrow, wide = sorted((across[one], across[other]))
+            narrower, wider = sorted((one, other), key=across.__getitem__)
+            narrow = across[narrower]
             is_wide = opening and width > WIDE_SHARE * narrow
-            is_wide |= width > ACROSS_SHARE * wide
+            is_wide |= width > ACROSS_SHARE * across[wider]
+            if areas[narrower] >= LONG * narrow**2 and width > ACROSS_SHARE * narrow:
+                is_wide |= _leads_on(one, borders) and _leads_on(other, borders)
             for room, into in ((one, other), (other, one)):
                 if room != into and (areas[room] < MIN_ROOM_M2 or is_wide):
                     candidates.append((areas[room], not opening, link.line, room, into))
@@ -608,6 +614,11 @@ def segment_rooms(
         across[into] = max(across[into], across[smallest])
         owner[owner == smallest] = into
     return by_size(np.append(owner, -1)[chambers.of_cell])
+
+
+def _leads_on(room: int, borders: Sequence[frozenset[int]]) -> bool:
+    """Return whether a room has passages to at least two others."""
+    return sum(room in border for border in borders) > 1
 
 
 def _clear_widths(of_cell: I32, count: int, cell: float) -> F64:
