@@ -31,7 +31,7 @@ from shapely import Polygon, affinity
 import fleet2d
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.rooms import division
+from fleet2d.floorplan.rooms import division, shape
 from fleet2d.floorplan.rooms.shape import (
     IN_RAGGED_WALLS,
     IN_STRAIGHT_WALLS,
@@ -392,8 +392,11 @@ SAME_PLACE = {
 """Maps of one place, which are left out together."""
 NECKS = (0.6, 0.65, 0.7, 0.75, 0.8)
 MOUTHS = (0.0, 0.25, 0.3, 0.35, 0.4)
+FURNITURE_M2 = (0.2, 0.3, 0.4, 0.5)
+"""Sizes up to which a free-standing obstacle narrows no space, chosen like the limits."""
 WALLS = {IN_STRAIGHT_WALLS: "straight walls", IN_RAGGED_WALLS: "ragged walls", OF_VACUUMS: "vacuum"}
-Scored = dict[Limits, dict[str, float]]
+Choice = tuple[float, Limits]
+Scored = dict[Choice, dict[str, float]]
 
 
 def place_of(name: str) -> str:
@@ -403,15 +406,21 @@ def place_of(name: str) -> str:
 
 
 def scores_by_limits(captured: Captured) -> tuple[str, Scored]:
-    """Return what the walls of a map are like, and the scores of its rooms by limits."""
+    """Return what the walls of a map are like, and the scores of its rooms by what is chosen."""
     divide = MagicMock(wraps=divide_by_shape)
     with patch.object(division, "divide_by_shape", divide):
         kind = "vacuum" if captured.kind == "vacuum" else "none"
         FloorPlan.build("map", captured.plan.free_space, doorways=None, regions_are=kind)
     rooms, cell, own = divide.call_args.args
-    hill, hills = find_hills(rooms, cell)
-    pixels = np.append(hill, -1)[captured.cells].astype(np.int64)
-    return WALLS[own], dict(by_limits(hills, cell, own.least_m2, *overlap(pixels, captured.truth)))
+    scored = {}
+    for furniture_m2 in FURNITURE_M2:
+        with patch.object(shape, "FURNITURE_M2", furniture_m2):
+            hill, hills = find_hills(rooms, cell)
+        pixels = np.append(hill, -1)[captured.cells].astype(np.int64)
+        common = overlap(pixels, captured.truth)
+        for limits, scores in by_limits(hills, cell, own.least_m2, *common):
+            scored[furniture_m2, limits] = scores
+    return WALLS[own], scored
 
 
 def by_limits(
@@ -433,21 +442,21 @@ def held_out_table() -> None:
     tables: dict[str, dict[str, list[dict[str, Any]]]] = defaultdict(lambda: defaultdict(list))
     for walls in WALLS.values():
         same = [(item, scored) for item, own, scored in maps if own == walls]
-        fitted = best_limits(scored for _, scored in same)
+        fitted = best_choice(scored for _, scored in same)
         print(f"{walls}: {len(same)} maps, fitted to all of them {fitted}")
         for item, scored in same:
             others = [s for other, s in same if place_of(other.name) != place_of(item.name)]
-            chosen = best_limits(others)
+            chosen = best_choice(others)
             tables[item.kind]["held out"].append(scored[chosen])
             tables[item.kind]["fitted"].append(scored[fitted])
-            print(f"  {item.name:<32}{_scores([scored[chosen]])}  {tuple(chosen)}")
+            print(f"  {item.name:<32}{_scores([scored[chosen]])}  {chosen[0], *chosen[1]}")
     for kind, table in tables.items():
         for name, rows in table.items():
             print(f"{kind + ', ' + name:<34}{_scores(rows)}")
 
 
-def best_limits(maps: Iterable[Scored]) -> Limits:
-    """Return the limits of the highest mean of IoU and recall."""
+def best_choice(maps: Iterable[Scored]) -> Choice:
+    """Return the furniture and limits of the highest mean of IoU and recall."""
     scores = list(maps)
     return max(
         scores[0], key=lambda s: np.mean([(m[s]["iou"] + m[s]["recall"]) / 2 for m in scores])
