@@ -27,7 +27,7 @@ MAX_PLACES = 4
 class Distance(Metric):
     """Metres that each body covers per day, as the sum of its moves from step to step.
 
-    The way through stairs or a lift doesn't count.
+    The way through stairs or a lift doesn't count; that to where an intervention puts a body does.
     """
 
     unit = "m a day"
@@ -58,7 +58,7 @@ class Travel(Metric):
 
     A robot rests where its position doesn't change for `rest` or longer, turning or not. A
     relocation is a rest more than `apart` away from the previous rest. Metres are the sum of the
-    moves from step to step.
+    moves from step to step. What an intervention moves counts as if the robot had driven.
 
     Attributes:
         rest: Shortest time at one place that is a rest.
