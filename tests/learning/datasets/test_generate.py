@@ -141,6 +141,16 @@ def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
     assert records(data) == records(make(out))
 
 
+@pytest.mark.slow
+def test_one_killed_before_it_noted_its_unfit_runs_goes_on(data: Dataset, tmp_path: Path) -> None:
+    """The plan is written first: a kill after it left a folder that couldn't be gone on with."""
+    parts = tmp_path / "killed" / "unfinished"
+    parts.mkdir(parents=True)
+    (parts / "plan.txt").write_text(f"{data.manifest.plan} {code_version()}")
+
+    assert records(data) == records(make(tmp_path / "killed"))
+
+
 def unfit(folder: Path) -> dict[str, Any]:
     """The small data set with one more household, of whom no home has the room."""
     log = folder / "sauna.txt"
