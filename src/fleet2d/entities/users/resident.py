@@ -312,7 +312,7 @@ class KnownHome:
     def in_core(self, name: str, venue: Venue) -> CoreVenue:
         """Return the venue of an activity as the core needs it, after an `update`."""
         key: Hashable = name
-        if venue is not self._person.venues[name]:
+        if venue is not self._person.venues.get(name):
             rooms, stores = ([room.index for room in each] for each in (venue.rooms, venue.stores))
             key = name, tuple(rooms), tuple(venue.seats), tuple(stores)
         if key not in self._core_venues:
