@@ -299,18 +299,11 @@ class RoutesAround:
         return cost
 
     def __call__(self, start: LatticePoint, goal: LatticePoint) -> I64 | None:
-        """Return a route between two lattice points, or None if none keeps clear.
-
-        From the border of the space, where bends of routes are, it first leads inside.
-        """
+        """Return a route between two lattice points, or None if none keeps clear."""
         space = self._body.space
-        if space.shortest is None:
-            return route_by_cost(space, self.cost, start, goal)
-        if strictly_inside(space.mesh, *start):
+        if space.shortest is not None and strictly_inside(space.mesh, *start):
             return space.shortest.around(*start, *goal, self.people)
-        inside = space.way_in(*start)
-        route = None if inside is None else space.shortest.around(*inside, *goal, self.people)
-        return None if route is None else np.concatenate([[start], route])
+        return route_by_cost(space, self.cost, start, goal)
 
 
 def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Note] = ()) -> Plan:

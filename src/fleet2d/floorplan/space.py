@@ -229,7 +229,7 @@ class Space:
         if strictly_inside(self.mesh, *start):
             route = self.routes.find(*start, *goal)
             return None if route is None else read_only(route)
-        inside = self.way_in(*start)
+        inside = self._way_in(*start)
         route = None if inside is None else self.routes.find(*inside, *goal)
         return None if route is None else read_only(np.concatenate([[start], route]))
 
@@ -265,8 +265,7 @@ class Space:
     def _metres(self, steps: NDArray[np.signedinteger]) -> F64:
         return np.where(steps >= 0, steps * (self.plan.lattice.cell / 5), np.inf)
 
-    def way_in(self, x: int, y: int) -> LatticePoint | None:
-        """Return a place strictly inside to which a straight way leads from the border, or None."""
+    def _way_in(self, x: int, y: int) -> LatticePoint | None:
         walls = self.walls
         triangle = locate(walls, x, y)
         for row, column in self.by_distance(x, y, ESCAPE_ATTEMPTS).tolist():
