@@ -236,7 +236,7 @@ STORED = [
     Defence(
         "it has no key twice",
         "artifacts.manifest",
-        "object_pairs_hook=_unique_keys,",
+        "object_pairs_hook=unique_keys,",
         "",
         "artifacts/test_seal.py::test_a_strange_text_is_refused",
     ),
