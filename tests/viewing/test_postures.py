@@ -1,6 +1,7 @@
 """Postures derived from key frames are those that the simulator had."""
 
 from collections import Counter
+from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 import fleet2d
 from fleet2d.floorplan.placed_objects import UsePlace
+from fleet2d.runtime.clock import Clock
 from fleet2d.viewing.postures import USED_WITHIN_M, Postures, postures_of
 
 HOME = {"simulation": {"start": "2026-01-05", "duration": "20 h", "seed": 3}}
@@ -70,11 +72,12 @@ def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then() -> None
     columns = {"entity": ["ana"] * 4, "y": [1.0] * 4, "away": [False] * 4, "kind": kind, "x": x}
     time = pa.array(start + np.array(at_s) * np.timedelta64(1, "s"), pa.timestamp("us"))
     manifest = {
-        "start": "2026-01-05T00:00:00", "step_us": 1_000_000, "steps": 100,
+        "step_us": 1_000_000, "steps": 100,
         "entities": {"users": ["ana"]},
     }  # fmt: skip
     frames = pa.table({**columns, "step": pa.array(step, pa.int64()), "time": time})
-    run: Any = SimpleNamespace(tables={"key_frames": frames}, manifest=manifest)
+    clock = Clock(datetime(2026, 1, 5), step_us=1_000_000, steps=100)
+    run: Any = SimpleNamespace(tables={"key_frames": frames}, manifest=manifest, clock=clock)
     chair = SimpleNamespace(name="chair", uses=[UsePlace(x=2, y=1, heading=0, posture="sit")])
     plan: Any = SimpleNamespace(objects=[chair])
 
@@ -83,6 +86,18 @@ def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then() -> None
     assert [(0, 60_000_000)] == list(
         zip(table["time_us"].to_pylist(), table["end_us"].to_pylist(), strict=True)
     )
+
+
+def test_people_sit_at_the_same_steps_in_a_home_with_a_time_zone(tmp_path: Path) -> None:
+    simulation = {**HOME["simulation"], "duration": "9 h"}
+    here = fleet2d.run({**FURNISHED, **PEOPLE, "simulation": simulation}, out=tmp_path / "here")
+    zoned = {**simulation, "time_zone": "Europe/Berlin"}
+    there = fleet2d.run({**FURNISHED, **PEOPLE, "simulation": zoned}, out=tmp_path / "there")
+
+    table = postures_of(there, there.plan)
+
+    assert table.num_rows > 0
+    assert table.equals(postures_of(here, here.plan))
 
 
 @pytest.mark.parametrize(

@@ -134,7 +134,7 @@ def _stays(run: Run) -> Iterator[PersonStays]:
     entity, names = categories(table["entity"])
     kind, kinds = categories(table["kind"])
     planned = kinds.index("planned") if "planned" in kinds else len(kinds)
-    start = np.datetime64(run.manifest["start"], "us").astype(np.int64)
+    start = run.clock.stamp(0).astype(np.int64)
     step_us = run.manifest["step_us"]
     columns = (values_of(table[name]) for name in ("time", "step", "x", "y", "away"))
     time, step, x, y, away = columns
