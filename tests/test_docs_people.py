@@ -152,7 +152,7 @@ def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
     starts = {
         "persona": "  the persona ", "copies of whole days": "  copies of whole days ",
         "Markov chain": "  a first-order Markov chain ", "`--private`": "a private persona ",
-        "the other days": "  the days they were fitted on ", "`--model laws`": "laws ",
+        "the other days": "  the days they were fitted on ",
     }  # fmt: skip
     part: list[str] = []
     for log, (name, *cells) in rows("routines", "| log (days) | |"):

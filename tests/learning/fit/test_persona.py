@@ -100,17 +100,11 @@ def test_days_go_from_waking_to_bed(life: Timeline) -> None:
     assert {23 * 60} == {day.bed for day in days}
 
 
-def test_a_known_life_is_found_again_and_kept_to(life: Timeline) -> None:
+def test_a_known_life_is_kept_to(life: Timeline) -> None:
     days = find_days(life)
-    fitted = fit_persona(life, days, model="laws")
+    fitted = fit_persona(life, days)
     assert ["weekday", "weekend"] == list(fitted.persona.days)
-    weekday = fitted.persona.days["weekday"]
-    assert abs(weekday.wake.at - timedelta(hours=7)) <= timedelta(minutes=6)
-    assert timedelta(hours=23) == weekday.sleep.at
-    out = weekday.do["leaving"]
-    assert abs(out.at - timedelta(hours=9)) <= timedelta(minutes=3)
     assert fitted.persona.activity("leaving").away
-    assert "leaving" not in fitted.persona.days["weekend"].do
     rooms = sample_persona(fitted, life, 70)[1]
     away = life.places.index("away")
     morning = rooms[:, 10 * 60 + 30] == away
@@ -137,7 +131,6 @@ def test_nights_away_are_lived_away() -> None:
     night = away[:, 2 * 60 : 5 * 60]
     assert (night.all(axis=1) | ~night.any(axis=1)).all()
     assert away.mean() == pytest.approx((minutes == 2).mean(), abs=0.08)
-    assert "7 nights away are slept at home" in fit_persona(timeline, days, model="laws").notes[-1]
 
 
 def test_the_written_persona_reads_back_as_the_fitted_one(life: Timeline, tmp_path: Path) -> None:
@@ -347,11 +340,6 @@ def test_a_log_that_nothing_can_be_fitted_to_is_refused(
     with pytest.raises(LogError, match=message):
         fit_routine(make(tmp_path), tmp_path / "persona.yaml")  # type: ignore[operator]
     assert not (tmp_path / "persona.yaml").exists()
-
-
-def test_laws_are_not_private(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="leave out --model"):
-        fit_routine(write_life(tmp_path, 12), tmp_path / "a.yaml", model="laws", private=True)
 
 
 def _csv(folder: Path) -> Path:

@@ -49,9 +49,6 @@ def fit_routine(  # noqa: PLR0913 - each is an option
     ] = None,
     seed: Annotated[int, typer.Option(help="The seed of the sampled days.")] = 0,
     *,
-    model: Annotated[
-        str, typer.Option(help="recorded: days that switch between those of the log; laws.")
-    ] = "recorded",
     sort: Annotated[bool, typer.Option(help="Sort lines whose time runs backwards.")] = False,
     rooms: Annotated[
         list[str] | None,
@@ -82,7 +79,6 @@ def fit_routine(  # noqa: PLR0913 - each is an option
         still: Silence in one room up to this is not.
         id: The person, of a log with several.
         time_zone: The time zone of the home, if times have an offset.
-        model: "recorded" or "laws", see `fit_persona`.
         private: Make new days of those of the log, so that the persona can be given to others.
 
     Raises:
@@ -101,10 +97,6 @@ def fit_routine(  # noqa: PLR0913 - each is an option
     layouts = ["auto", *LAYOUTS]
     if layout not in layouts:
         raise LogError(f"--format: expected one of {', '.join(layouts)}, got {layout!r}")
-    if model not in ("recorded", "laws"):
-        raise LogError(f"--model: expected recorded or laws, got {model!r}")
-    if private and model != "recorded":
-        raise LogError("--private: laws hold durations of the log; leave out --model")
     log = read_log(path, layout, sort=sort, id=id, time_zone=time_zone)
     if not isinstance(log, ActivityLog):
         raise LogError(f"{path} is a log of positions: a persona is fitted to a log of rooms")
@@ -112,17 +104,16 @@ def fit_routine(  # noqa: PLR0913 - each is an option
     with errors_as(LogError, of=PydanticCustomError):
         timeline = read_timeline(log, chosen, parse_duration(gap), parse_duration(still))
     days = find_days(timeline)
-    validation = validate(timeline, seed=seed, model=model, private=private)  # type: ignore[arg-type]
+    validation = validate(timeline, seed=seed, private=private)
     about = (
         "like the days of a log" if private else f"fitted to {len(days)} days of {log.path.name}"
     )
-    fitted = fit_persona(timeline, days, about, model=model, private=private)  # type: ignore[arg-type]
+    fitted = fit_persona(timeline, days, about, private=private)
     with os_errors_as(LogError, f"{out} can't be written"):
         out.write_text(to_yaml(fitted.document), encoding="utf-8")
     lines = [f"note: {note}" for note in (*log.notes, *fitted.notes, *gaps(timeline, days))]
     lines += table(validation)
-    if fitted.log:
-        lines += privacy(fitted, private)
+    lines += privacy(fitted, private)
     if picture is not None:
         from fleet2d.learning.fit.picture import draw_persona
 

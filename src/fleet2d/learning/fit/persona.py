@@ -4,7 +4,7 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import yaml
@@ -24,9 +24,8 @@ from fleet2d.logs.log import AWAY, LogError
 from fleet2d.logs.placement import USUAL_ROOMS
 from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import NO_SLEEP_S, RecordedDay, parse_day, write_day
-from fleet2d.runtime.clock import DAY_MINUTES, DAY_S
+from fleet2d.runtime.clock import DAY_S
 
-BLOCK = 180  # length of a part of the day that has pastimes of its own [min]
 QUANTILES = 21  # maximum number of quantiles of a law of durations
 # Words of activities that are done standing, lying and sitting; the first that fit decide.
 STAND = ("cook", "prepar", "wash", "dish", "clean", "transition", "hygiene", "bathing")
@@ -48,15 +47,8 @@ SIT = (
     "social",
     "toilet",
 )
-# A task is done on at least this share of the days, at most once a day. The standard deviation of
-# its beginning is at most SPREAD, and the gap to begins at other times more than APART [min].
-MIN_SHARE = 0.8
-SPREAD = 20
-APART = 60
-LONG = 10  # minimum mean duration of a task [min]
 MIN_TEMPLATE_DAYS = 4  # minimum number of days of a kind from which a template is fitted
 WORKDAYS = 5
-Model = Literal["recorded", "laws"]
 
 
 @dataclass
@@ -68,7 +60,7 @@ class FittedPersona:
         persona: The persona.
         states: The timeline's state of each of its activities.
         notes: Decisions that the fit had to make.
-        log: The recorded days of the log; none with the model `laws`.
+        log: The recorded days of the log.
     """
 
     document: dict[str, Any]
@@ -79,24 +71,13 @@ class FittedPersona:
 
 
 def fit_persona(
-    timeline: Timeline,
-    days: Sequence[LivedDay],
-    about: str = "",
-    *,
-    model: Model = "recorded",
-    private: bool = False,
+    timeline: Timeline, days: Sequence[LivedDay], about: str = "", *, private: bool = False
 ) -> FittedPersona:
     """Fit a persona to days of a log.
 
-    With the model `recorded`, its days are drawn from those of the log, and switch from one to
-    another where both have the same activity at about the same time. If it is private, it has days
-    that are like those of the log instead (see `private_days`), and no measured durations.
-
-    With the model `laws`, an activity that is done once on most days at about the same time becomes
-    a task, with the mean and spread of its beginning, the measured law of its duration and the
-    share of days that have it. All other activities become pastimes: for each slot of three hours
-    of the day, their weights and durations are those that began in this slot. Getting up at night
-    becomes a rate of `fetches` during sleep.
+    Its days are drawn from those of the log, and switch from one to another where both have the
+    same activity at about the same time. If it is private, it has days that are like those of the
+    log instead (see `private_days`), and no measured durations.
 
     Raises:
         LogError: There are no days to fit.
@@ -104,23 +85,16 @@ def fit_persona(
     if not days:
         raise LogError("the log has no day with a night before and a night after it: log more days")
     names = _names(timeline)
-    fitter = _Fitter(timeline, names, min(day.wake for day in days))
+    fitter = _Fitter(timeline, names)
     kinds, notes = _kinds_of_days(timeline, days)
-    away = [day for day in days if any(up.length == day.next_wake - day.bed for up in day.up)]
-    if away and model == "laws":
-        notes.append(f"{len(away)} nights away are slept at home: choose the model `recorded`")
     templates: dict[str, dict[str, Any]] = {}
     log: list[RecordedDay] = []
     for name, (on, members) in kinds.items():
-        if model == "recorded":
-            recorded = fitter.recorded(members)
-            log += recorded
-            new = private_days(recorded, 0, name) if private else recorded
-            templates[name] = {"on": on, "recorded": [write_day(day) for day in new]}
-        else:
-            kind = name if len(kinds) > 1 else ""
-            templates[name] = {"on": on, **fitter.template(members, kind)}
-    fitter.sleep(days, gets_up=model == "laws")
+        recorded = fitter.recorded(members)
+        log += recorded
+        new = private_days(recorded, 0, name) if private else recorded
+        templates[name] = {"on": on, "recorded": [write_day(day) for day in new]}
+    fitter.sleep()
     fitter.rest(days)
     activities = fitter.activities
     if private:
@@ -222,88 +196,11 @@ def _base_name(state: ActivityPlace, asleep: bool) -> str:
 class _Fitter:
     """Gathers the activities that the templates of a persona use."""
 
-    def __init__(self, timeline: Timeline, names: list[str], dawn: int) -> None:
+    def __init__(self, timeline: Timeline, names: list[str]) -> None:
         self.timeline = timeline
         self.names = names
-        self.dawn = dawn  # the earliest waking of all kinds of days
         self.activities: dict[str, dict[str, Any]] = {}
         self.states: dict[str, int] = {}
-
-    def template(self, days: Sequence[LivedDay], kind: str) -> dict[str, Any]:
-        """Return the template of a kind of days."""
-        wakes = [day.wake for day in days]
-        beds = [day.bed for day in days]
-        shortest = min(day.next_wake - day.bed for day in days)
-        # If the next day begins as early as possible.
-        least_night = self.dawn + DAY_MINUTES - max(beds)
-        tasks, rest = self._tasks(days)
-        return {
-            "wake": _timing(wakes),
-            "sleep": {**_timing(beds), "at_least": f"{max(1, min(shortest, least_night))} min"},
-            "do": tasks,
-            "leisure": self._leisure(rest, min(wakes), kind),
-        }
-
-    def _tasks(self, days: Sequence[LivedDay]) -> tuple[dict[str, Any], list[Stretch]]:
-        """Return the tasks, and the stretches that are part of none."""
-        by_state: dict[int, list[tuple[int, Stretch]]] = defaultdict(list)
-        for day in days:
-            for run in day.awake:
-                by_state[run.state].append((day.number, run))
-        tasks = {}
-        rest = []
-        for state, done in sorted(by_state.items()):
-            for number, cluster in enumerate(_clusters(done)):
-                longest: dict[int, Stretch] = {}
-                for of_day, run in cluster:
-                    if of_day not in longest or run.length > longest[of_day].length:
-                        longest[of_day] = run
-                stretches = list(longest.values())
-                if not _is_task(stretches, len(cluster), len(days)):
-                    rest += [run for _, run in cluster]
-                    continue
-                name = self.names[state] + (f"_{number + 1}" if number else "")
-                tasks[name] = {
-                    **({"activity": self.names[state]} if number else {}),
-                    **_timing([run.begin for run in stretches]),
-                    "takes": _takes(stretches),
-                    # Below 1, so that it may be left out of a day that is too full.
-                    "probability": round(min(len(stretches) / len(days), 0.99), 3),
-                }
-                self._add(self.names[state], state, takes=_takes(stretches))
-                rest += [run for n, run in cluster if longest[n] is not run]
-        return tasks, rest
-
-    def _leisure(self, rest: Iterable[Stretch], dawn: int, kind: str) -> dict[str, Any]:
-        """Return the pastimes: one per block of the day and room, weighted by its stays.
-
-        All stays in a room are one pastime, as a pastime is never followed by itself.
-        """
-        blocks: dict[int, dict[str, list[Stretch]]] = defaultdict(lambda: defaultdict(list))
-        for run in rest:
-            place = self.timeline.states[run.state].place
-            blocks[(run.begin - dawn) // BLOCK][place].append(run)
-        leisure = {}
-        for block in sorted(blocks):
-            first = dawn + block * BLOCK
-            if first >= dawn + DAY_MINUTES:
-                continue
-            last = min(first + BLOCK, dawn + DAY_MINUTES) - 1
-            for _, done in sorted(blocks[block].items()):
-                state, is_main = self._main_state(done)
-                base = self.names[state] if is_main else f"in_{self.timeline.states[state].place}"
-                name = "_".join([base, *([kind] if kind else []), f"{first // 60 % 24:02}h"])
-                self._add(name, state, takes=_takes(done))
-                between = [_clock(first), _clock(last)]
-                leisure[name] = {"weight": float(len(done)), "between": between}
-        return leisure
-
-    @staticmethod
-    def _main_state(done: Sequence[Stretch]) -> tuple[int, bool]:
-        """Return the state with the most time, and whether that is more than half of the time."""
-        lasts = _time_by_state(done)
-        state = max(lasts, key=lambda s: (lasts[s], -s))
-        return state, 2 * lasts[state] > lasts.total()
 
     def recorded(self, days: Sequence[LivedDay]) -> list[RecordedDay]:
         """Return days as recorded days."""
@@ -320,23 +217,10 @@ class _Fitter:
             self._add(name, state, takes=_takes([Stretch(state, 0, 1)]))
         return recorded
 
-    def sleep(self, days: Sequence[LivedDay], *, gets_up: bool) -> None:
-        """Describe sleep, and how often and how long the person is up at night."""
+    def sleep(self) -> None:
+        """Describe sleep, in the place where the person sleeps most."""
         state = max(sleep_states(self.timeline), key=lambda s: (self.timeline.minutes == s).sum())
-        fields: dict[str, Any] = {"posture": "lie"}
-        places = self.timeline.states
-        here = (AWAY, places[state].place)
-        up = [run for day in days for run in day.up if places[run.state].place not in here]
-        if up and gets_up:
-            asleep = sum(day.next_wake - day.bed for day in days) - sum(r.length for r in up)
-            rooms = Counter(places[run.state].place for run in up)
-            usual = max(rooms, key=lambda place: (rooms[place], place))
-            fields |= {
-                "fetches": f"{max(1, asleep // len(up))} min",
-                "fetches_from": [usual, "any"],
-                "fetch_takes": _takes(up),
-            }
-        self._add("sleep", state, **fields)
+        self._add("sleep", state, posture="lie")
 
     def rest(self, days: Sequence[LivedDay]) -> None:
         """Describe rest, for times in which nothing else fits, by the most frequent state."""
@@ -401,45 +285,6 @@ def _time_by_state(done: Iterable[Stretch]) -> Counter[int]:
     return lasts
 
 
-def _clusters(done: Sequence[tuple[int, Stretch]]) -> list[list[tuple[int, Stretch]]]:
-    """Return stretches, with the number of their day, in groups more than APART from each other."""
-    groups: list[list[tuple[int, Stretch]]] = []
-    for entry in sorted(done, key=lambda entry: (entry[1].begin, entry[0])):
-        if not groups or entry[1].begin - groups[-1][-1][1].begin > APART:
-            groups.append([])
-        groups[-1].append(entry)
-    return groups
-
-
-def _is_task(stretches: Sequence[Stretch], count: int, days: int) -> bool:
-    """Return whether an activity is a task.
-
-    Args:
-        stretches: The longest one of each day that has some.
-        count: The number of all of them.
-        days: The number of days.
-    """
-    begins = np.array([run.begin for run in stretches], np.float64)
-    return (
-        len(stretches) >= max(MIN_SHARE * days, 2)
-        and count <= 1.3 * len(stretches)
-        and float(np.std(begins)) <= SPREAD
-        and float(np.mean([run.length for run in stretches])) >= LONG
-    )
-
-
-def _timing(begins: Sequence[int]) -> dict[str, Any]:
-    """Return mean, spread and window of times of day [min]."""
-    mean = float(np.mean(begins))
-    std = float(np.std(begins))
-    first, last = min(begins), max(begins)
-    return {
-        "at": _clock(min(max(round(mean), first), last)),
-        "spread": f"{max(1, round(std))} min",
-        "between": [_clock(first), _clock(last)],
-    }
-
-
 def _takes(done: Sequence[Stretch]) -> dict[str, Any]:
     """Return the measured law of durations, as quantiles at even steps from 0 to 1."""
     lengths = np.log(np.sort([float(run.length) for run in done]))
@@ -450,10 +295,6 @@ def _takes(done: Sequence[Stretch]) -> dict[str, Any]:
     quantiles = [_seconds(round(60 * v)) for v in values.tolist()]
     # A short minimum duration, so that it may be cut rather than left out.
     return {"law": "measured", "quantiles": quantiles, "at_least": "1 min"}
-
-
-def _clock(minute: int) -> str:
-    return f"{minute // 60 % 24:02}:{minute % 60:02}"
 
 
 def _seconds(seconds: int) -> str:

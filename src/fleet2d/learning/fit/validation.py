@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fleet2d.kernels import I16
-from fleet2d.learning.fit.persona import FittedPersona, Model, fit_persona
+from fleet2d.learning.fit.persona import FittedPersona, fit_persona
 from fleet2d.learning.fit.privacy import Repeats, repeats
 from fleet2d.learning.fit.timeline import (
     LivedDay,
@@ -20,10 +20,8 @@ from fleet2d.learning.fit.timeline import (
     sleep_states,
 )
 from fleet2d.logs.log import LogError
-from fleet2d.routines.activity import Activity, seconds
-from fleet2d.routines.distributions import KNOTS, exponential
 from fleet2d.routines.life import Life
-from fleet2d.routines.planner import Episode, RecordedDay
+from fleet2d.routines.planner import RecordedDay
 from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.determinism import Draws, stream_key
 
@@ -53,41 +51,20 @@ def sample_persona(
         (days, 86400) to the second.
     """
     life = Life(fitted.persona, seed, "fit")
-    key = stream_key(seed, "fit", "up at night")
     places = timeline.places
     place_of = {n: places.index(timeline.states[s].place) for n, s in fitted.states.items()}
     states = np.zeros((days + 2) * DAY_S, np.int16)
     rooms = np.zeros((days + 2) * DAY_S, np.int16)
     for day in range(days + 1):  # the first night is of the day before the first
         ordinal = MONDAY - 1 + day
-        for i, episode in enumerate(life.day(ordinal)):
+        for episode in life.day(ordinal):
             begin, end = day * DAY_S + episode.begin, day * DAY_S + episode.end
             states[begin:end] = fitted.states[episode.activity]
             rooms[begin:end] = place_of[episode.activity]
-            activity = fitted.persona.activity(episode.activity)
-            if activity.fetches is not None and activity.fetches_from[0] in places:
-                place = places.index(activity.fetches_from[0])
-                for first, last in _fetches(activity, episode, Draws(key, ordinal * 1024 + i)):
-                    rooms[day * DAY_S + first : day * DAY_S + last] = place
     states, rooms = (labels[DAY_S : (days + 1) * DAY_S] for labels in (states, rooms))
     if to_second:
         return states.reshape(days, -1), rooms.reshape(days, -1)
     return by_minute(states, len(timeline.states)), by_minute(rooms, len(places))
-
-
-def _fetches(activity: Activity, episode: Episode, draws: Draws) -> list[tuple[int, int]]:
-    """Return begin and end [s] of each short trip during an activity, drawn as for residents."""
-    assert activity.fetches is not None
-    wait = exponential(seconds(activity.fetches))
-    takes = activity.fetch_takes.table()
-    times = []
-    now = episode.begin + wait.knots[draws.below(KNOTS)]
-    while now < episode.end:
-        end = now + takes.draw(draws)
-        if end < episode.end:
-            times.append((now, end))
-        now = end + wait.knots[draws.below(KNOTS)]
-    return times
 
 
 def sample_days(labels: I16, days: int, seed: int = 0) -> I16:
@@ -165,12 +142,7 @@ class Validation(NamedTuple):
 
 
 def validate(
-    timeline: Timeline,
-    folds: int = FOLDS,
-    seed: int = 0,
-    *,
-    model: Model = "recorded",
-    private: bool = False,
+    timeline: Timeline, folds: int = FOLDS, seed: int = 0, *, private: bool = False
 ) -> Validation:
     """Fit a persona to a part of the days and compare it with the others, for each part in turn.
 
@@ -198,7 +170,7 @@ def validate(
     for fold in range(folds):
         held = days[fold::folds]
         rest = [day for day in days if day not in held]
-        fitted = fit_persona(timeline, rest, model=model, private=private)
+        fitted = fit_persona(timeline, rest, private=private)
         by_fold.append(_fold(timeline, fitted, rest, held, seed))
     return Validation(len(days), folds, *(_mean(found) for found in zip(*by_fold, strict=True)))
 
