@@ -34,7 +34,7 @@ class Absent:
 sys.meta_path.insert(0, Absent())
 """
 """A `sitecustomize` that hides modules from a process and from the children that it starts."""
-OTHERS = {"paho-mqtt": "paho", "rerun-sdk": "rerun"}
+OTHERS = {"paho-mqtt": "paho"}
 """Modules whose names aren't those of their packages."""
 TOOLS = ("test", "browser", "page", "lint", "docs", "build", "cluster")
 
@@ -110,7 +110,6 @@ LACKING = [
     ("show bundled:paper --out plan.png", "", "viz"),
     ("export run run.mcap", "", "ros"),
     ("export run bag", "", "ros"),
-    ("export run run.rrd", "", "rerun"),
     ("study run study.yaml --out plain-study", "", "study"),
     ("study status st", "", "study"),
     ("study report st", "matplotlib", "viz"),

@@ -42,7 +42,7 @@ def test_formats_of_installed_packages_are_listed(monkeypatch: pytest.MonkeyPatc
     ("name", "layout"),
     [
         ("w.mcap", "mcap"),
-        ("w.RRD", "rerun"),
+        ("w.MCAP", "mcap"),
         ("w.txt", "casas"),
         ("w", "rosbag2"),
         ("w.csv", "csv"),

@@ -204,7 +204,6 @@ _FORMATS = {
         "Trace events as JSON for Perfetto (ui.perfetto.dev): plans, moves, interactions, power and"
         " battery of each body.",
     ),
-    "rerun": ("rerun", "A recording for the viewer of Rerun: needs the extra `rerun`."),
     "rosbag2": (
         "bags",
         "ROS 2 messages as a bag in SQLite, which any ROS 2 can play: needs the extra `ros`.",
@@ -213,7 +212,7 @@ _FORMATS = {
 """The module of each format, and what it is."""
 
 # Formats whose files have another suffix than the name of the format.
-_SUFFIXES = {".txt": "casas", ".rrd": "rerun", ".db": "home_assistant", "": "rosbag2"}
+_SUFFIXES = {".txt": "casas", ".db": "home_assistant", "": "rosbag2"}
 
 
 def export(
@@ -268,7 +267,7 @@ def format_of(path: Path) -> str:
         suffixes = ", ".join(f".{own}" for own in formats() if own not in _SUFFIXES.values())
         raise InputError(
             f"{path}: no format has the suffix {path.suffix!r}: name the format by --format, or"
-            f" write a file with one of {suffixes}, .rrd, .txt, .db, or a folder"
+            f" write a file with one of {suffixes}, .txt, .db, or a folder"
         )
     return name
 
