@@ -361,6 +361,77 @@ def test_a_scenario_does_not_talk_to_other_machines_by_itself() -> None:
         open_peers(changed)
 
 
+def ordered(*messages: dict[str, Any]) -> tuple[list[Any], dict[str, int], list[str]]:
+    """Return what is done with messages that arrive in one step, what is counted, and told."""
+    run, peer, bridge = bridged({3: list(messages)})
+    acts = [(act["do"], act.get("to")) for act in run.manifest["interventions"]]
+    return acts, dict(bridge.counts), peer.told
+
+
+HALLWAY = GOAL | {"to": "hallway_1", "id": "second"}
+VELOCITY = {"type": "velocity", "entity": "astro", "forward": 0.1}
+
+
+def test_messages_of_one_step_count_in_the_order_of_their_arrival() -> None:
+    acts, counts, _ = ordered(GOAL, VELOCITY, HALLWAY)
+    assert acts == [("steer", None), ("send", "hallway_1")]
+    assert counts == {"received": 3, "replaced": 1, "applied": 2}
+
+    acts, _, _ = ordered(VELOCITY, GOAL, VELOCITY)
+    assert [act for act, _ in acts] == ["send", "steer"]
+
+
+@pytest.mark.parametrize("name", ["", "first"])
+def test_a_goal_after_a_withdrawn_one_stays(name: str) -> None:
+    cancel = {"type": "cancel", "entity": "astro", "id": name}
+
+    acts, counts, told = ordered(GOAL | {"id": "first"}, cancel, HALLWAY)
+
+    assert acts == [("send", "hallway_1")]
+    assert counts == {"received": 3, "replaced": 2, "applied": 1}
+    assert told == []
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        (pose(1), pose(1) | {"x": -90.0}),
+        (GOAL, GOAL | {"to": "kitchn_1"}),
+    ],
+)
+def test_a_message_that_is_refused_replaces_none(right: Any, wrong: Any) -> None:
+    alone, _, _ = ordered(right)
+    acts, counts, told = ordered(right, wrong)
+
+    assert acts == alone
+    assert counts == {"received": 2, "applied": 1, "wrong": 1}
+    assert len(told) == 1
+
+
+def test_a_message_of_another_than_the_source_replaces_none() -> None:
+    source, other = Now({3: [GOAL]}), Now({3: [HALLWAY]})
+    peers = {SOURCE: source, "function": other}
+    run = Bridge(fleet2d.Simulation(sourced()), peers, speed=0).run()
+
+    assert [act["to"] for act in run.manifest["interventions"]] == ["kitchen_1"]
+
+
+def test_what_is_refused_is_tried_only_so_often() -> None:
+    acts, counts, _ = ordered(GOAL, *[GOAL | {"to": "kitchn_1"}] * 200)
+
+    assert acts == []
+    assert counts == {"received": 201, "wrong": 100, "replaced": 101}
+
+
+def test_a_goal_of_a_client_that_came_back_within_a_step_stays() -> None:
+    acts, counts, _ = ordered(GOAL, None, HALLWAY)  # type: ignore[arg-type]
+    assert acts == [("send", "hallway_1")]
+
+    acts, counts, _ = ordered(GOAL, None)  # type: ignore[arg-type]
+    assert [act for act, _ in acts] == ["send", "release"]
+    assert counts["withdrawn"] == 1
+
+
 # Frames that don't fit
 
 
@@ -478,6 +549,15 @@ def test_two_programs_that_send_poses_of_one_body_are_told() -> None:
 
     assert first.told == ["of two senders: ana: poses of two programs arrive: name its source"]
     assert bridge.counts == {"received": 2, "applied": 2, "of two senders": 1}
+
+
+def test_two_programs_whose_poses_come_within_one_step_are_told() -> None:
+    first, second = Now({0: [pose(0)]}), Now({0: [pose(1)]})
+    bridge = Bridge(fleet2d.Simulation(LIVE), [first, second], speed=0)
+    bridge.run()
+
+    assert first.told == ["of two senders: ana: poses of two programs arrive: name its source"]
+    assert bridge.counts["replaced"] == 1
 
 
 def test_a_goal_keeps_its_heading() -> None:

@@ -1,11 +1,13 @@
 """Access of other packages to a simulation, beyond its public methods."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fleet2d.engine.simulation import Simulation
 from fleet2d.engine.state import State
 from fleet2d.entities.behavior import Situation
+from fleet2d.interventions.intervention import parse_intervention
 
 if TYPE_CHECKING:
     from fleet2d.expectations.verdict import VerdictEvidence
@@ -29,6 +31,18 @@ def add_note(simulation: Simulation, text: str) -> None:
 def interventions_of(simulation: Simulation) -> list[dict[str, Any]]:
     """Return the interventions so far, of the script and from outside, as in a manifest."""
     return list(simulation._state.interventions.done)
+
+
+def check_intervention(simulation: Simulation, act: Mapping[str, Any]) -> None:
+    """Refuse an intervention that can't be applied at the present step, and apply none.
+
+    Raises:
+        ScenarioError: It is not valid, or names something unknown.
+        PlacementError: There is no such place, or it can't be reached.
+    """
+    from fleet2d.engine.world import EngineWorld  # few runs need it
+
+    parse_intervention(act).check(EngineWorld(simulation._state, simulation.step))
 
 
 def stop(simulation: Simulation) -> None:

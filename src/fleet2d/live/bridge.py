@@ -24,7 +24,7 @@ import shapely
 
 from fleet2d.bounds import one_line
 from fleet2d.configuration.problems import suggest
-from fleet2d.engine.access import add_note
+from fleet2d.engine.access import add_note, check_intervention
 from fleet2d.engine.loop import deferred_interrupt
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
@@ -60,6 +60,8 @@ REACH_M = 1.0
 MAX_PER_STEP = 1000
 # More messages than this, times the bound of a step, aren't even kept until then.
 MAX_WAITING_STEPS = 10
+# So many messages that a body refuses are tried for an earlier one that it takes.
+MAX_TRIED = 100
 # Of so many steps it is kept how late they began: a run may last for months.
 MAX_LATENESS = 100_000
 # The number of reasons of one kind that are told.
@@ -336,10 +338,7 @@ class Bridge:
                 due = began + (simulation.step - first) * step_s / self.speed
                 _wait(due, min(LEAD_S, LEAD_SHARE * step_s / self.speed))
                 self.lateness_s.append(time.monotonic() - due)
-            messages, gone = self._received()
-            self._apply(messages)
-            for sender in gone:
-                self._withdraw(sender)
+            self._apply(self._received())
             self._stop_the_silent()
             with deferred_interrupt(self._stop):  # half a step could not be stored
                 simulation.advance()
@@ -354,11 +353,11 @@ class Bridge:
 
     # What arrives
 
-    def _received(self) -> tuple[list[tuple[LiveMessage, Sender]], list[Sender]]:
-        """Return the messages to apply at the present step with their senders, and who is gone."""
-        messages: list[tuple[LiveMessage, Sender]] = []
-        latest: dict[tuple[str, str], int] = {}
-        gone: list[Sender] = []
+    def _received(self) -> list[tuple[LiveMessage | None, Sender]]:
+        """Return the messages for the present step with their senders; None: who is gone."""
+        received: list[tuple[LiveMessage | None, Sender]] = []
+        orders: set[tuple[str, str]] = set()
+        others = 0
         with self._lock:
             dropped = self._dropped
             self._dropped = 0
@@ -368,23 +367,23 @@ class Bridge:
         for _ in range(self._inbox.qsize()):
             arrived, sender, content = self._inbox.get()
             if content is None:
-                gone.append(sender)
+                received.append((None, sender))
                 continue
-            message = self._read(content, len(messages) >= self.max_per_step)
+            message = self._read(content, others + len(orders) >= self.max_per_step)
             if message is None or not self._is_timely(message, arrived, sender):
                 continue
-            if isinstance(message, PoseMessage | GoalMessage | VelocityMessage):
-                key = message.type, message.entity
-                if key in latest:  # only the last one of a body in a step counts
-                    before, its_sender = messages[latest[key]]
-                    if isinstance(before, GoalMessage):
-                        self._goals.refuse(before, its_sender, "another goal came at once")
-                    messages[latest[key]] = message, sender
-                    self.counts["replaced"] += 1
-                    continue
-                latest[key] = len(messages)
-            messages.append((message, sender))
-        return messages, gone
+            try:
+                self._check(message, sender)
+            except InputError as error:
+                self._refuse(message, sender, str(error))
+                continue
+            received.append((message, sender))
+            key = _order_of(message)
+            if key is None:
+                others += 1
+            else:
+                orders.add(key)
+        return received
 
     def _read(self, content: Any, is_full: bool) -> LiveMessage | None:
         """Return a message; None if there is none in the content, or no room for it."""
@@ -429,19 +428,72 @@ class Bridge:
             self._numbers[sender] = message.number
         return True
 
-    def _apply(self, messages: Sequence[tuple[LiveMessage, Sender]]) -> None:
-        for message, sender in messages:
+    def _apply(self, received: Sequence[tuple[LiveMessage | None, Sender]]) -> None:
+        """Apply messages in the order in which they arrived."""
+        for message, sender in self._last_of(received):
+            if message is None:
+                self._withdraw(sender)
+                continue
             try:
-                self._check(message, sender)
-                for act in _acts_of(self._mended(message)):
+                self._check_goal(message)
+                for act in _acts_of(message):
                     self.simulation.do(act)
             except InputError as error:
-                self._count("wrong", str(error))
-                if isinstance(message, GoalMessage):
-                    self._goals.refuse(message, sender, str(error))
+                self._refuse(message, sender, str(error))
                 continue
             self.counts["applied"] += 1
             self._take_note(message, sender)
+
+    def _last_of(
+        self, received: Sequence[tuple[LiveMessage | None, Sender]]
+    ) -> list[tuple[LiveMessage | None, Sender]]:
+        """Return what counts of a step: of each body the last of its poses, goals and velocities.
+
+        A message that can't be applied replaces none.
+        """
+        counting: list[tuple[LiveMessage | None, Sender]] = []
+        last: dict[tuple[str, str] | None, Sender] = {}
+        refused: Counter[tuple[str, str]] = Counter()
+        for message, sender in reversed(received):
+            if message is None:
+                counting.append((None, sender))
+                continue
+            key = _order_of(message)
+            later = last.get(
+                ("goal", message.entity) if isinstance(message, CancelMessage) else key
+            )
+            if later is not None:
+                self._replace(message, sender, later)
+                continue
+            try:
+                mended = self._mended(message)
+                if key is not None:
+                    for act in _acts_of(mended):
+                        check_intervention(self.simulation, act)
+            except InputError as error:
+                self._refuse(message, sender, str(error))
+                if key is not None:
+                    refused[key] += 1
+                    if refused[key] == MAX_TRIED:
+                        last[key] = sender
+                continue
+            counting.append((mended, sender))
+            if key is not None:
+                last[key] = sender
+        return counting[::-1]
+
+    def _replace(self, message: LiveMessage, sender: Sender, later: Sender) -> None:
+        """Count a message instead of which a later one counts, and tell poses of two programs."""
+        self.counts["replaced"] += 1
+        if isinstance(message, GoalMessage):
+            self._goals.refuse(message, sender, "another goal came at once")
+        elif isinstance(message, PoseMessage) and sender != later:
+            self._tell_two_senders(message.entity)
+
+    def _refuse(self, message: LiveMessage, sender: Sender, reason: str) -> None:
+        self._count("wrong", reason)
+        if isinstance(message, GoalMessage):
+            self._goals.refuse(message, sender, reason)
 
     def _take_note(self, message: LiveMessage, sender: Sender) -> None:
         """Keep track of goals and of poses that are expected, after a message was applied."""
@@ -471,19 +523,20 @@ class Bridge:
         off = math.hypot(pose.x - x, pose.y - y)
         is_recent = time.monotonic() - self._heard.get(name, -math.inf) < self.silence_s
         if before != sender and is_recent:
-            self._count("of two senders", f"{name}: poses of two programs arrive: name its source")
+            self._tell_two_senders(name)
         if off > JUMP_M + JUMP_M_PER_S * passed_s:
             self._count(
                 "jumps", f"{name}: a pose is {off:.1f} m from the one {passed_s:g} s before"
             )
+
+    def _tell_two_senders(self, name: str) -> None:
+        self._count("of two senders", f"{name}: poses of two programs arrive: name its source")
 
     def _check(self, message: LiveMessage, sender: Sender) -> None:
         """Refuse messages from others than the source, and poses of bodies that decide."""
         kind, name = _part_of(message)
         if self._sources.get((kind, name), sender[0]) != sender[0]:
             raise InputError(f"{name} takes messages of its source only, not of others")
-        if isinstance(message, CancelMessage) and not self._goals.has(name, message.id):
-            raise InputError(f"{name} has no goal{f' {message.id!r}' if message.id else ''}")
         if not isinstance(message, PoseMessage):
             return
         actors = self.simulation.actors
@@ -496,6 +549,12 @@ class Bridge:
                 f"{message.entity} decides itself where it goes: only a body with the behavior live"
                 " gets poses"
             )
+
+    def _check_goal(self, message: LiveMessage) -> None:
+        """Refuse the end of a goal that a body hasn't by now."""
+        if isinstance(message, CancelMessage) and not self._goals.has(message.entity, message.id):
+            name = f" {message.id!r}" if message.id else ""
+            raise InputError(f"{message.entity} has no goal{name}")
 
     def _mended(self, message: LiveMessage) -> LiveMessage:
         """Return a message with a pose that its body can have, and with detections in the home.
@@ -621,6 +680,13 @@ def _part_of(message: LiveMessage) -> tuple[str, str]:
     kind = "perceives" if isinstance(message, DetectionsMessage) else "body"
     name: str = message.entity  # type: ignore[attr-defined]
     return kind, name
+
+
+def _order_of(message: LiveMessage) -> tuple[str, str] | None:
+    """Return what says that only the last such message of a step counts: its type and body."""
+    if isinstance(message, PoseMessage | GoalMessage | VelocityMessage):
+        return message.type, message.entity
+    return None
 
 
 def _heading_of(message: PoseMessage | GoalMessage) -> dict[str, float]:
