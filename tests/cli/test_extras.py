@@ -105,7 +105,6 @@ LACKING = [
     ("view home.yaml --no-browser", "", "view"),
     ("export run run.mp4", "", "viz"),
     ("export run run.mp4", "av", "film"),
-    ("export run report.html --format report", "", "viz"),
     ("show run --out run.png", "", "viz"),
     ("show bundled:paper --out plan.png", "", "viz"),
     ("export run run.mcap", "", "ros"),

@@ -29,7 +29,6 @@ from fleet2d.errors import Fleet2DError, RunDirectoryError
 from fleet2d.live.exporters import Selection, exporter
 from fleet2d.runs.run import open_run
 from fleet2d.viewing.page_data import export_html
-from fleet2d.viewing.report import write_report
 
 SECRET = "precious, and nobody's business"
 
@@ -56,10 +55,6 @@ def to_sensors(run: Path) -> None:
     exporter("casas")(opened, run.parent / "sensors.txt", Selection.of(opened))
 
 
-def to_report(run: Path) -> None:
-    write_report(open_run(run), run / "report.html")
-
-
 def to_film(run: Path) -> None:
     from fleet2d.viewing.film import write_film
 
@@ -84,15 +79,13 @@ READERS: dict[str, Callable[[Path], Any]] = {
 # They make figures, which takes longer.
 PAINTERS: dict[str, Callable[[Path], Any]] = {
     "show": to_picture,
-    "report": to_report,
     "film": to_film,
 }
 FILES = (
     "manifest.json", "manifest.json.partial", "floorplan.json", "floorplan.json.partial",
     "key_frames.parquet", "key_frames.parquet.partial", "sensors.parquet", "learned",
     "learned/share.npz", "run.lock", "unfinished", "unfinished/journal", "unfinished/checkpoint",
-    "unfinished/checkpoint.partial", "picture.png", "picture.png.partial", "report.html",
-    "report.html.partial", "film.gif", "film.gif.partial", ".film.gif.unfinished.gif",
+    "unfinished/checkpoint.partial", "picture.png", "picture.png.partial", "film.gif", "film.gif.partial", ".film.gif.unfinished.gif",
 )  # fmt: skip
 
 
@@ -203,9 +196,9 @@ def attack(run: Path, elsewhere: Path, use: Callable[[Path], Any]) -> str:
             assert "\n" not in message
             assert len(message) < 1500
     assert before == state_of(elsewhere)
-    for written in (run / "report.html", run.parent / "page.html"):
-        if written.is_file() and not written.is_symlink():
-            assert SECRET not in written.read_text()
+    written = run.parent / "page.html"
+    if written.is_file() and not written.is_symlink():
+        assert SECRET not in written.read_text()
     return message
 
 

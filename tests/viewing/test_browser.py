@@ -874,7 +874,7 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
 
 
 def test_page_works_in_the_frame_of_a_notebook(browser: Any, run_dir: Path) -> None:
-    """Jupyter, marimo and reports show the page in a frame that may run scripts, and nothing else."""
+    """Jupyter and marimo show the page in a frame that may run scripts, and nothing else."""
     document = html_of([embedded_run(PageData(fleet2d.open_run(run_dir)), 0, 9 * 3600)])
     page = browser.new_page()
     page.set_content('<iframe sandbox="allow-scripts" width="1000" height="800"></iframe>')

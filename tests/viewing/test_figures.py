@@ -1,4 +1,4 @@
-"""Pictures of moments and stretches, films, reports: written completely, in the requested format."""
+"""Pictures of moments and stretches, films: written completely, in the requested format."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from fleet2d.errors import InputError
 from fleet2d.kernels import U8
 from fleet2d.viewing.figures import draw_failure, draw_moment, draw_stretch
 from fleet2d.viewing.film import LitHome, draw_frames, stage_of, write_film
-from fleet2d.viewing.report import write_report
 from fleet2d.viewing.stage import Stage
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".gif": b"GIF8", ".webp": b"RIFF"}
@@ -139,52 +138,6 @@ def test_impossible_film_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=words):
         write_film(fleet2d.open_run(run_dir), tmp_path / name, 0, 100, **options)  # type: ignore[arg-type]
-
-
-@pytest.fixture(scope="module")
-def report(run_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The report of a run with a note that looks like a script."""
-    run = fleet2d.open_run(run_dir)
-    run.notes.append("<script>alert(1)</script>")
-    target = tmp_path_factory.mktemp("report") / "report.html"
-    write_report(run, target)
-    return target.read_text(encoding="utf-8")
-
-
-@pytest.mark.slow
-def test_report_says_what_ran_and_how_to_run_it_again(run_dir: Path, report: str) -> None:
-    run, text = fleet2d.open_run(run_dir), report
-    for words in (
-        str(run.digest),
-        "fleet2d verify",
-        "--again",
-        "bath_door",
-        "sightings · ana",
-        "<img",
-    ):
-        assert words in text
-    assert 3 == text.count("<img")
-    assert '<iframe title="Timeline" sandbox="allow-scripts"' in text
-
-
-@pytest.mark.slow
-def test_report_begins_with_what_is_violated(tmp_path: Path) -> None:
-    changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
-    run = fleet2d.run("bundled:paper", *changes, seed=4)
-    write_report(run, tmp_path / "report.html")
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    verdict = text.index("<b>\u2717 1 of 1 expectation violated: still at Mon 05 Jan 00:00:0")
-    assert text.index("<h1>") < verdict < text.index('<th scope="row">status')
-
-
-def test_report_without_expectations_or_with_a_note_is_calm(report: str) -> None:
-    assert "border-left" not in report.partition("<h2>Timeline")[0]
-    assert "expectation" not in report.partition("<h2>Metrics")[0]
-
-
-def test_report_escapes_what_a_scenario_names(report: str) -> None:
-    assert "<script>" not in report
-    assert "alert(1)" in report
 
 
 @pytest.mark.parametrize(

@@ -10,24 +10,10 @@ from fleet2d.testing.answer import answer, headline
 from fleet2d.testing.claim import percent
 from fleet2d.testing.gate import HELD, NOT_RUN, Gate, PairedChange, Tally, listed
 from fleet2d.viewing.page_data import POLICY, write_file
-from fleet2d.viewing.report import STYLE
 
 MAX_BUILDS = 12
 """Builds of the history in the page: the newest."""
-LOOK = """
-.verdict { padding: .6rem 1rem; border-left: .4rem solid; font-size: 1.2rem; font-weight: 600; }
-.good { background: #3a7d4422; }
-.bad { background: #b3261e22; }
-.verdict.good { border-color: #3a7d44; }
-.verdict.bad { border-color: #b3261e; }
-.odd { background: #c2850022; }
-td { vertical-align: top; }
-td.good, td.bad, td.odd { padding-left: .4rem; }
-td { overflow-wrap: break-word; }
-td:last-child { min-width: 9rem; }
-pre { white-space: pre-wrap; }
-@media print { figure, table { break-inside: avoid; } }
-"""
+STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 KIND_OF = {HELD: "good", NOT_RUN: "odd"}
 """Class of a cell with a verdict; "bad" for others."""
 
@@ -53,7 +39,7 @@ def write_report(
         '<html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{title}</title><style>{STYLE}{LOOK}</style></head><body>",
+        f"<title>{title}</title><style>{STYLE}</style></head><body>",
         f'<h1>Release gate</h1><p class="verdict {kind}">{title}.</p>',
         *_says(gate),
         *_coverage(gate),

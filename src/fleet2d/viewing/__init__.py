@@ -1,4 +1,4 @@
-"""Viewing: pictures, films, pages, reports and notebooks of homes and runs.
+"""Viewing: pictures, films, pages and notebooks of homes and runs.
 
 It is an extension of IPython, which `import fleet2d` loads in a notebook by itself.
 """

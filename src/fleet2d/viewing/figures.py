@@ -33,7 +33,7 @@ from fleet2d.viewing.pictures.run import run_figure
 from fleet2d.viewing.run_facts import bodies_of
 from fleet2d.viewing.stage import Stage, draw_strip
 
-FigureKind = Literal["life", "heat", "strip", "answers"]
+FigureKind = Literal["life", "heat", "strip"]
 
 BLUR_M = 0.15
 SAMPLES = 40_000
@@ -169,8 +169,7 @@ def draw_stretch(run: Run, first: int, end: int, path: Path, kind: FigureKind = 
         end: The step before which it ends.
         path: The file: .png, .svg or .pdf. An existing file is replaced.
         kind: `life`: paths and presence in the home, and rooms by day. `heat`: where people and
-            robots spent their time. `strip`: a row per body, coloured by room. `answers`: what
-            people answered robots, by day and by hour.
+            robots spent their time. `strip`: a row per body, coloured by room.
 
     Raises:
         InputError: The file can't be written.
@@ -184,10 +183,6 @@ def stretch_figure(run: Run, first: int, end: int, kind: FigureKind = "life") ->
     part = part_of_run(run, first, end)
     if kind == "life":
         return run_figure(part)
-    if kind == "answers":
-        from fleet2d.viewing.pictures.charts import answers_figure  # few pictures need it
-
-        return answers_figure(part)
     return _heat_figure(part) if kind == "heat" else strip_figure(part)
 
 

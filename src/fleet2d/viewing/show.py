@@ -55,10 +55,10 @@ def show_diary(name: str | None, out: Path | None, days: int, seed: int) -> list
 
 
 Figure = Annotated[
-    Literal["life", "heat", "strip", "answers"],
+    Literal["life", "heat", "strip"],
     typer.Option(
         help="Of a run: life in the home; heat maps of where people and robots were; a strip of"
-        " time, a row for each; what people answered robots."
+        " time, a row for each."
     ),
 ]
 
@@ -210,7 +210,7 @@ class RunPicture(NamedTuple):
     at: str | None = None
     begin: str | None = None
     end: str | None = None
-    figure: Literal["life", "heat", "strip", "answers"] = "life"
+    figure: Literal["life", "heat", "strip"] = "life"
 
     def check(self) -> None:
         """Check that the options choose one picture.

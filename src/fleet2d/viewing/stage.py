@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib.dates as mdates
 import numpy as np
@@ -18,18 +18,19 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, deep_color
 from fleet2d.runs.moments import part_of_run
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import Trajectory
 from fleet2d.runtime.clock import Clock
+from fleet2d.runtime.events import EventKind
 from fleet2d.runtime.local_time import rules_of
 from fleet2d.viewing.contract import BodyFacts
 from fleet2d.viewing.home_facts import WallsHistory
 from fleet2d.viewing.look import body_label, room_labels
 from fleet2d.viewing.night import Key, Light
-from fleet2d.viewing.pictures.charts import AskedTime, asked_of
 from fleet2d.viewing.pictures.floorplan import LETTER_WIDTH, floorplan_axes, points_per_m
 from fleet2d.viewing.pictures.life import (
     HATCH_COLOR,
@@ -141,6 +142,64 @@ Box = tuple[float, float, float, float]
 """Left, bottom, right and top of a text [m]."""
 
 
+# What came of a request or question, in words.
+SHOWN_AS = {
+    Outcome.ACCEPTED: Outcome.ACCEPTED,
+    Outcome.DEFERRED: Outcome.DEFERRED,
+    Outcome.DECLINED: Outcome.DECLINED,
+    Outcome.SENT_AWAY: "sent away",
+    Outcome.BANNED: "sent away",
+    Outcome.SWITCHED_OFF: "sent away",
+}
+# Events by which a robot is no longer with the person whom it addressed.
+ENDS_TALK = frozenset(
+    {EventKind.DELIVERED, EventKind.COLLECTS, EventKind.WITHDRAWS, EventKind.INTERACTION_OVER}
+)
+
+
+class AskedTime(NamedTuple):
+    """A time at which a robot addressed a person.
+
+    Attributes:
+        robot: The robot.
+        text: The interaction and the person meant.
+        step: When.
+        answer: What came of it, in words.
+        answered: The step of the answer; None without one.
+        end: The step at which the robot had carried it out or withdrew; None if it did neither.
+    """
+
+    robot: str
+    text: str
+    step: int
+    answer: str
+    answered: int | None = None
+    end: int | None = None
+
+
+def asked_of(run: Run) -> list[AskedTime]:
+    """Return the times that robots addressed people, by the events.
+
+    Example:
+        >>> import fleet2d
+        >>> asked_of(fleet2d.run("simulation.duration=1 h"))
+        []
+    """
+    events = run.tables["events"]
+    asked: list[AskedTime] = []
+    open_ones: dict[str, AskedTime] = {}  # by robot
+    columns = (events[name].to_pylist() for name in ("step", "entity", "event", "detail"))
+    for step, robot, event, detail in sorted(zip(*columns, strict=True), key=lambda row: row[0]):
+        if event in ENDS_TALK and robot in open_ones:
+            asked.append(open_ones.pop(robot)._replace(end=step))
+        elif event == EventKind.ASKS:
+            asked += [open_ones.pop(robot)] if robot in open_ones else []
+            open_ones[robot] = AskedTime(robot, detail, step, "no answer")
+        elif event in SHOWN_AS and robot in open_ones and open_ones[robot].answered is None:
+            open_ones[robot] = open_ones[robot]._replace(answer=SHOWN_AS[event], answered=step)
+    return [*asked, *open_ones.values()]
+
+
 @dataclass
 class BodyArtists:
     """A body on the stage: its facts, its path, its name, and the outlines of what it sees [m].
@@ -226,7 +285,7 @@ class Stage:
         self._cursor = None if self._strip is None else self._fill_strip(self._strip)
         self._observed = _observations(self._part)
         has_talks = bool(run.manifest["scenario"].get("interactions"))
-        self._talks = [each for each in asked_of(run)[0] if each.step < end] if has_talks else []
+        self._talks = [each for each in asked_of(run) if each.step < end] if has_talks else []
         self._scene: object = None
 
     @property

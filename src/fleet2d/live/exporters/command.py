@@ -9,7 +9,6 @@ from fleet2d.errors import InputError
 from fleet2d.live import exporters
 from fleet2d.options import Trust, show_code
 
-_REPORT = "report"
 _FILMS = (".mp4", ".gif", ".webp")
 
 
@@ -19,7 +18,7 @@ def _format_help() -> str:
     )
     return (
         "Its format; by default that of the suffix of FILE. .html: a page that plays anywhere."
-        f" .mp4, .gif, .webp: a film. {_REPORT}: a page of what ran, metrics and figures."
+        " .mp4, .gif, .webp: a film."
         f" {' '.join(described)}"
     )
 
@@ -49,7 +48,6 @@ def export(  # noqa: PLR0913 - options of the command line
     Examples:
       fleet2d export runs/home-001 evening.mp4 --from 'day 3 18:00' --to 'day 3 19:00'
       fleet2d export runs/home-001 week.html
-      fleet2d export runs/home-001 report.html --format report
     """
     from fleet2d.runs.moments import steps_of
     from fleet2d.runs.run import open_run
@@ -57,13 +55,11 @@ def export(  # noqa: PLR0913 - options of the command line
     suffix = out.suffix.lower()
     is_film = layout is None and suffix in _FILMS
     is_page = layout is None and suffix == ".html"
-    is_data = not is_film and not is_page and layout != _REPORT
+    is_data = not is_film and not is_page
     if not is_film:
         _refuse(f"{out} is no film", speed=speed, height=height)
     if not is_data:
         _refuse(f"{out} is no data for other programs", every=every)
-    if layout == _REPORT:
-        _refuse("a report is of the whole run", **{"from": begin, "to": end})
     run = open_run(directory, trust=trust)
     if trust:
         show_code(run.manifest)
@@ -80,13 +76,8 @@ def export(  # noqa: PLR0913 - options of the command line
 
         export_html(run, out, first, last)
         typer.echo(f"{out}: {out.stat().st_size / 1e6:.1f} MB")
-    elif is_data:
-        typer.echo(exporters.export(run, out, layout, first=first, end=last, every=every))
     else:
-        from fleet2d.viewing.report import write_report
-
-        write_report(run, out)
-        typer.echo(out)
+        typer.echo(exporters.export(run, out, layout, first=first, end=last, every=every))
 
 
 def _refuse(reason: str, **options: object) -> None:

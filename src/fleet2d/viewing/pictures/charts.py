@@ -1,21 +1,19 @@
-"""Charts of people's days, of how reliable estimates of presence are, and of what people answer."""
+"""Charts of people's days, and of how reliable estimates of presence are."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import date, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from fleet2d.algorithms.presence.belief import ANYONE
 from fleet2d.configuration.units import WEEKDAYS
-from fleet2d.errors import ArtifactError, InputError
-from fleet2d.interactions.interaction import Outcome
+from fleet2d.errors import ArtifactError
 from fleet2d.kernels import F64, I64
 from fleet2d.metrics.rtp_score import (
     GapMeasures,
@@ -31,9 +29,7 @@ from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, RESUMES, Episode
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
-from fleet2d.runtime.clock import HOUR_S, midnight_of
-from fleet2d.runtime.events import EventKind
-from fleet2d.runtime.local_time import written
+from fleet2d.runtime.clock import HOUR_S
 from fleet2d.viewing.pictures.floorplan import picture, write_picture
 
 MONDAY = date(2026, 1, 5)
@@ -268,158 +264,3 @@ def draw_gaps(measures: GapMeasures, path: Path) -> None:
                 axes.yaxis.set_major_formatter("{x:g}")
         panels[0].legend(frameon=False)
         figure.tight_layout()
-
-
-# What came of a request or question, in the order in which it is stacked, and its color.
-ANSWER_COLORS = {
-    Outcome.ACCEPTED: "#009988",
-    Outcome.DEFERRED: "#77aadd",
-    Outcome.DECLINED: "#ee7733",
-    "no answer": "#bbbbbb",
-    "sent away": "#cc3311",
-}
-SHOWN_AS = {
-    Outcome.ACCEPTED: Outcome.ACCEPTED,
-    Outcome.DEFERRED: Outcome.DEFERRED,
-    Outcome.DECLINED: Outcome.DECLINED,
-    Outcome.SENT_AWAY: "sent away",
-    Outcome.BANNED: "sent away",
-    Outcome.SWITCHED_OFF: "sent away",
-}
-# Events by which a robot is no longer with the person whom it addressed.
-ENDS_TALK = frozenset(
-    {EventKind.DELIVERED, EventKind.COLLECTS, EventKind.WITHDRAWS, EventKind.INTERACTION_OVER}
-)
-MOOD_COLOR = "#aa3377"
-EXPIRED_COLOR = "#9a9a9a"
-WEEKLY_FROM = 70  # days of a run from which on bars are weeks
-
-
-class AskedTime(NamedTuple):
-    """A time at which a robot addressed a person.
-
-    Attributes:
-        robot: The robot.
-        user: The person meant.
-        text: The interaction and the person meant.
-        step: When.
-        answer: What came of it: a key of ANSWER_COLORS.
-        answered: The step of the answer; None without one.
-        end: The step at which the robot had carried it out or withdrew; None if it did neither.
-    """
-
-    robot: str
-    text: str
-    step: int
-    answer: str
-    answered: int | None = None
-    end: int | None = None
-
-    @property
-    def user(self) -> str:
-        """The person meant."""
-        return self.text.rpartition(" ")[2]
-
-
-def asked_of(run: Run) -> tuple[list[AskedTime], list[AskedTime]]:
-    """Return the times that robots addressed people, and the requests that expired, by the events.
-
-    Example:
-        >>> import fleet2d
-        >>> asked_of(fleet2d.run("simulation.duration=1 h"))
-        ([], [])
-    """
-    events = run.tables["events"]
-    asked: list[AskedTime] = []
-    expired: list[AskedTime] = []
-    open_ones: dict[str, AskedTime] = {}  # by robot
-    columns = (events[name].to_pylist() for name in ("step", "entity", "event", "detail"))
-    for step, robot, event, detail in sorted(zip(*columns, strict=True), key=lambda row: row[0]):
-        if event in ENDS_TALK and robot in open_ones:
-            asked.append(open_ones.pop(robot)._replace(end=step))
-        elif event == EventKind.ASKS:
-            asked += [open_ones.pop(robot)] if robot in open_ones else []
-            open_ones[robot] = AskedTime(robot, detail, step, "no answer")
-        elif event in SHOWN_AS and robot in open_ones and open_ones[robot].answered is None:
-            open_ones[robot] = open_ones[robot]._replace(answer=SHOWN_AS[event], answered=step)
-        elif event == EventKind.EXPIRED:
-            expired.append(AskedTime(robot, detail, step, event))
-    return [*asked, *open_ones.values()], expired
-
-
-def _hours_of(run: Run) -> Callable[[int], float]:
-    """Return the function from steps to hours since the midnight before the run."""
-    clock = run.clock
-    midnight = midnight_of(clock.start)
-    return lambda step: (written(clock.time(step)) - midnight) / timedelta(hours=1)
-
-
-def answers_figure(run: Run) -> Figure:
-    """Return a figure of what people answered: by day or week, and by hour of the day.
-
-    Bars are the times that a robot addressed a person, by answer, and ticks below them requests
-    that expired. The line is the person's annoyance, if the run has the metric `interactions`.
-
-    Raises:
-        InputError: Robots wanted nothing of anybody.
-    """
-    asked, expired = asked_of(run)
-    pairs = sorted({(each.robot, each.user) for each in [*asked, *expired]})
-    if not pairs:
-        raise InputError("robots addressed nobody in this run: there are no answers to draw")
-    figure = Figure(figsize=(10.67, 0.6 + 2.3 * len(pairs)), dpi=100, facecolor="white")
-    panels = figure.subplots(len(pairs), 2, width_ratios=(3, 1), squeeze=False)
-    hours_of = _hours_of(run)
-    days = 1 + int(hours_of(run.manifest["steps"] - 1) // 24)
-    width = 7 if days >= WEEKLY_FROM else 1
-    for (robot, user), (by_day, by_hour) in zip(pairs, panels, strict=True):
-        own, own_expired = (
-            [each for each in times if (each.robot, each.user) == (robot, user)]
-            for times in (asked, expired)
-        )
-        late = [hours_of(each.step) / 24 for each in own_expired]
-        times = [(hours_of(each.step), each.answer) for each in own]
-        _stack(by_day, [(hours / 24, answer) for hours, answer in times], width, days)
-        _stack(by_hour, [(hours % 24, answer) for hours, answer in times], 1, 24)
-        by_day.plot(late, np.zeros(len(late)), "|", color=EXPIRED_COLOR, clip_on=False)
-        accepted = sum(each.answer == Outcome.ACCEPTED for each in own)
-        title = f"{robot} asked {user} {len(own)} times: {accepted} accepted, {len(late)} expired"
-        by_day.set_title(title, loc="left", fontsize=10)
-        by_day.set(xlabel="day", ylabel="times a week" if width == 7 else "times a day")
-        by_hour.set(xlabel="hour of the day", xticks=range(0, 25, 6))
-        _draw_annoyance(run, robot, user, by_day)
-    place = {"loc": "lower right", "bbox_to_anchor": (1, 1)}
-    panels[0, 1].legend(**place, ncols=3, frameon=False, fontsize=7)
-    figure.tight_layout()
-    return figure
-
-
-def _stack(axes: Axes, answers: Sequence[tuple[float, str]], width: int, end: int) -> None:
-    """Draw the answers in intervals of a width up to an end, stacked."""
-    edges = np.arange(0, end + width, width)
-    below = np.zeros(len(edges) - 1)
-    for answer, color in ANSWER_COLORS.items():
-        counts, _ = np.histogram([at for at, each in answers if each == answer], edges)
-        middles = edges[:-1] + width / 2
-        axes.bar(middles, counts, width * 0.85, bottom=below, color=color, label=answer)
-        below += counts
-    axes.set_xlim(0, edges[-1])
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _draw_annoyance(run: Run, robot: str, user: str, axes: Axes) -> None:
-    """Draw the annoyance of a person over the days, if the run has stored it."""
-    tables = run.tables
-    if "interactions" not in tables or "annoyance" not in tables["interactions"].column_names:
-        return
-    table = tables["interactions"]
-    hours_of = _hours_of(run)
-    columns = (table[name].to_pylist() for name in ("asked_at", "robot", "addressed", "annoyance"))
-    pairs = zip(*columns, strict=True)
-    rows = [(hours_of(at) / 24, value) for at, *pair, value in pairs if pair == [robot, user]]
-    if rows:
-        mood = axes.twinx()
-        mood.plot(*zip(*rows, strict=True), color=MOOD_COLOR, linewidth=1.2)
-        mood.set_ylabel("annoyance", color=MOOD_COLOR)
-        mood.set_ylim(bottom=0)
-        mood.spines["top"].set_visible(False)

@@ -1,18 +1,14 @@
-"""The figure of answers: what robots asked whom, what came of it, and what expired."""
+"""What robots asked whom, and what came of it, as a film tells it."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tests.entities.robots.test_interact import PILL, ana, home
-from tests.scenes import scenario
+from tests.entities.robots.test_interact import ana, home
 
 import fleet2d
-from fleet2d.errors import InputError
-from fleet2d.viewing.pictures.charts import answers_figure, asked_of
-from fleet2d.viewing.report import report_html
-from fleet2d.viewing.stage import Stage
+from fleet2d.viewing.stage import Stage, asked_of
 
 
 def run_with(outcomes: tuple[str, ...], **changes: Any) -> fleet2d.Run:
@@ -32,24 +28,16 @@ def run_with(outcomes: tuple[str, ...], **changes: Any) -> fleet2d.Run:
     ],
 )
 def test_a_question_is_drawn_by_its_answer(outcome: str, answer: str) -> None:
-    (asked, *_), _ = asked_of(run_with((outcome,)))
+    (asked, *_) = asked_of(run_with((outcome,)))
 
-    assert ("astro", "ana", answer) == (asked.robot, asked.user, asked.answer)
+    assert ("astro", "pill ana", answer) == (asked.robot, asked.text, asked.answer)
     assert 600 <= asked.step < 1800
-
-
-def test_expired_requests_are_drawn_at_their_deadline() -> None:
-    robots = {"astro": {"behaviors": [{"type": "interact", "seek": False}]}}
-    asked, (expired,) = asked_of(run_with(("accepted",), robots=robots))
-
-    assert [] == asked
-    assert 70 * 60 == expired.step
 
 
 def test_a_question_lasts_until_it_is_carried_out_or_the_robot_withdraws() -> None:
     for outcome, takes in (("accepted", 30), ("", 0)):
         run = run_with((outcome,))
-        (talk, *_), _ = asked_of(run)
+        (talk, *_) = asked_of(run)
         assert talk.end is not None
         if outcome:
             assert talk.step + 5 == talk.answered
@@ -61,7 +49,7 @@ def test_a_question_lasts_until_it_is_carried_out_or_the_robot_withdraws() -> No
 
 def test_a_film_says_what_is_asked_and_answered_beside_the_robot() -> None:
     run = run_with(("accepted",))
-    (talk, *_), _ = asked_of(run)
+    (talk, *_) = asked_of(run)
     stage = Stage(run, talk.step - 60, talk.step + 120, figure=Figure())
     robot = next(body for body in stage.bodies if body.facts["name"] == "astro")
 
@@ -78,25 +66,3 @@ def test_a_film_says_what_is_asked_and_answered_beside_the_robot() -> None:
     # The film draws a new frame at each of these moments.
     moments = np.array([talk.step, talk.answered, talk.end + 1]) - (talk.step - 60)
     assert stage.changes()[moments].all()
-
-
-def test_annoyance_is_drawn_for_each_person() -> None:
-    interactions = {"pill": PILL | {"at": ["07:10", "08:00"], "within": "40 min"}}
-    run = run_with(("ignored", "accepted"), interactions=interactions)
-    figure = answers_figure(run)
-    (line,) = next(axes for axes in figure.axes if axes.get_ylabel() == "annoyance").lines
-
-    assert run.tables["interactions"]["annoyance"].to_pylist() == list(line.get_ydata())
-
-
-def test_a_run_without_interactions_has_no_such_figure() -> None:
-    with pytest.raises(InputError, match="no answers to draw"):
-        answers_figure(fleet2d.run(scenario("10 min")))
-
-
-@pytest.mark.slow
-def test_reports_show_answers_if_robots_want_something() -> None:
-    without = fleet2d.run(home("10 min", interactions={}, robots={"astro": {}}))
-
-    assert "what they answered" in report_html(run_with(("accepted",)))
-    assert "what they answered" not in report_html(without)
