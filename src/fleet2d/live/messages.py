@@ -15,6 +15,8 @@ MAX_BYTES = 1 << 20
 """Size of a message."""
 MAX_ID = 200
 """Length of the name of a goal."""
+MAX_NUMBER = 1 << 53
+"""The largest number of a message; all programs write numbers up to here in full."""
 Coordinate = Annotated[float, Field(ge=-MAX_PLACE_M, le=MAX_PLACE_M)]
 
 
@@ -27,7 +29,7 @@ class LiveMessage(Settings):
     """
 
     time: float | None = None
-    number: int | None = Field(default=None, ge=0)
+    number: int | None = Field(default=None, ge=0, le=MAX_NUMBER)
 
 
 class PoseMessage(LiveMessage):
