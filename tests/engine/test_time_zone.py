@@ -237,6 +237,40 @@ def test_rooms_of_a_smart_home_are_in_local_time_on_both_sides_of_the_change(
     assert not told.notes
 
 
+@pytest.mark.parametrize(
+    ("rows", "minutes"),
+    [
+        # Of one tag, then of the other: the other's rows run backwards, not this one's.
+        (["02:50:00 a", "03:10:00 a", "02:10:00 b", "03:20:00 b"], [130, 260]),
+        # The clock of the receiver jitters.
+        (["02:10:00.5 a", "02:10:00.3 b", "02:40:00 b", "03:20:00 a"], [130, 160]),
+    ],
+)
+def test_rows_of_other_tags_and_jitter_begin_no_second_hour(
+    tmp_path: Path, rows: list[str], minutes: list[float]
+) -> None:
+    path = tmp_path / "tags.csv"
+    lines = ["time,id,x,y", *(f"2026-10-25 {row.replace(' ', ',')},1,1" for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    zone = load_scenario("bundled:paper", BERLIN, AUTUMN).simulation.clock.zone
+
+    log: Any = read_log(path, "positions", time_zone=zone, id="b")
+
+    assert [t // 60_000_000 for t in log.time_us.tolist()] == minutes
+
+
+def test_a_row_that_jitters_in_the_doubled_hour_is_refused_as_in_any_other(tmp_path: Path) -> None:
+    path = tmp_path / "tag.csv"
+    times = ["02:10:00.5", "02:10:00.3", "02:40:00"]
+    path.write_text("\n".join(["time,x,y", *(f"2026-10-25 {t},1,1" for t in times)]) + "\n")
+    zone = load_scenario("bundled:paper", BERLIN, AUTUMN).simulation.clock.zone
+
+    with pytest.raises(InputError, match=r"line 3: the time runs backwards there .* 0\.2 s"):
+        read_log(path, "positions", time_zone=zone)
+    log: Any = read_log(path, "positions", time_zone=zone, sort=True)
+    assert [t // 60_000_000 for t in log.time_us.tolist()] == [130, 130, 160]
+
+
 def test_questions_about_a_run_are_in_local_time() -> None:
     """Of an assistant, by DuckDB."""
     pytest.importorskip("duckdb")

@@ -22,6 +22,8 @@ from fleet2d.storage.bags import LATEST_SIMULATED_NS
 
 # A longer step forward is one of the clock, or a log of two stays [us].
 JUMP_US = 7 * DAY_US
+# Lines that are earlier by less are in no other hour: two sensors were written down late [us].
+JITTER_US = 60_000_000
 EARLIEST_US = -2_208_988_800_000_000
 LATEST_US = 7_258_118_400_000_000
 """The years 1900 and 2200 [us since 1970]."""
@@ -120,12 +122,16 @@ class Stamps(NamedTuple):
         last_us = int(self.time_us.max())
         with errors_as(LogError, f"{path}: there are no rules of the time zone", of=KeyError):
             zone = zone.over(first_us, last_us)
-        utc_us = self.time_us if self.has_zone else moments_in_file(self.time_us, zone, noun, notes)
         row = np.flatnonzero(usable)
         if not len(row):
             raise LogError(f"{path} has no row with a position")
+        utc_us = self.time_us if self.has_zone else zone.moments(self.time_us)
         first_day = int(zone.readings(utc_us).min()) // DAY_US
-        utc_us, row, order_notes = _in_order(utc_us[row], row, path, self.line, sort=sort)
+        if self.has_zone:
+            utc_us = utc_us[row]
+        else:  # only what counts: other rows may be in another order
+            utc_us = moments_in_file(self.time_us[row], zone, noun, notes)
+        utc_us, row, order_notes = _in_order(utc_us, row, path, self.line, sort=sort)
         notes.extend([*order_notes, *_jumps(utc_us, self.line[row])])
         since_us = utc_us - zone.utc_us(first_day * DAY_US)
         return LocalTimes(since_us, row, date(1970, 1, 1) + timedelta(days=first_day))
@@ -149,7 +155,8 @@ class LocalTimes(NamedTuple):
 def moments_in_file(readings_us: I64, zone: Zone, noun: str, notes: list[str]) -> I64:
     """Return the moments of readings of a clock, in the order of a file.
 
-    Within an hour that the clock reads twice, the second time begins where readings run backwards.
+    Within an hour that the clock reads twice, the second time begins where readings run backwards,
+    by more than a clock that jitters.
 
     Args:
         readings_us: What the clock read, without offset [us since 1970], int64 (n,).
@@ -166,7 +173,8 @@ def moments_in_file(readings_us: I64, zone: Zone, noun: str, notes: list[str]) -
     ):
         is_twice = (utc_us >= change_us - (before_us - after_us)) & (utc_us < change_us)
         rows = np.flatnonzero(is_twice)
-        runs_back = readings_us[rows] < np.maximum.accumulate(readings_us[rows])
+        back_us = np.maximum.accumulate(readings_us[rows]) - readings_us[rows]
+        runs_back = back_us > JITTER_US
         second = rows[np.logical_or.accumulate(runs_back)]
         utc_us[second] += before_us - after_us
         if len(rows) and not len(second):
