@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from fleet2d.cli.__main__ import app
 from fleet2d.engine.simulation import Simulation
 from fleet2d.scenario.load import load_scenario
+from fleet2d.viewing.tutorials import notebook_of
 
 FENCE = re.compile(r"^```(\w+)(?: title=(\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
@@ -92,12 +93,15 @@ def write_titled_blocks(page: Path, folder: Path) -> None:
             (folder / block.title).write_text(block.text, encoding="utf-8")
 
 
-def run_python_blocks(page: Path) -> None:
+def run_notebook(page: Path) -> None:
+    """Run the cells that a page has as a notebook, in order, in the present folder."""
     names: dict[str, object] = {"__name__": "docs"}
-    for block in blocks(page, "python"):
-        if not block.title:
-            code = "\n" * block.line + block.text  # so that a traceback shows the page's line
-            exec(compile(code, str(page), "exec"), names)
+    for number, cell in enumerate(notebook_of(page.read_text(encoding="utf-8"))["cells"]):
+        first, _, rest = cell["source"].partition("\n")
+        if first.startswith("%%writefile "):
+            Path(first.split()[1]).write_text(rest, encoding="utf-8")
+        elif cell["cell_type"] == "code":
+            exec(compile(cell["source"], f"{page}, cell {number}", "exec"), names)
 
 
 @pytest.fixture
@@ -114,9 +118,8 @@ def test_python_of_a_page_runs_in_an_empty_folder(
     if page.stem == "gym":
         pytest.importorskip("gymnasium", reason="needs the extra gym")
         pytest.importorskip("pettingzoo", reason="needs the extra gym")
-    write_titled_blocks(page, folder)
     monkeypatch.syspath_prepend(folder)  # as Python's prompt has its folder
-    run_python_blocks(page)
+    run_notebook(page)
     for block in blocks(page):
         sys.modules.pop(Path(block.title or "").stem, None)  # another page may have one, too
 
@@ -126,7 +129,7 @@ def test_python_of_a_page_runs_in_an_empty_folder(
 def test_scenario_of_a_page_can_be_simulated(block: Block, folder: Path) -> None:
     write_titled_blocks(block.page, folder)
     if block.page.name == "floorplans.md":
-        run_python_blocks(block.page)  # writes the plan that the scenario names
+        run_notebook(block.page)  # writes the plan that the scenario names
     file = folder / "scenario.yaml"
     file.write_text(block.text, encoding="utf-8")
     simulation = Simulation(file)

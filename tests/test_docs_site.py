@@ -15,6 +15,8 @@ import yaml
 from tests.pages import DOCS, PAGES, ROOT
 from tools import gallery, site, site_versions
 
+from fleet2d.viewing.tutorials import sources
+
 KINDS = {"tutorials", "how-to", "reference", "explanation", "results"}
 NOTEBOOKS = sorted((DOCS / "tutorials").glob("*.ipynb"))
 MOST_WORDS = 40_000
@@ -75,6 +77,16 @@ def test_navigation_names_each_page_that_is_written_or_made() -> None:
     pages = {**site.written_pages(), **site.generated_pages()}
     assert all(pages.values())
     assert set(nav()) == {uri for uri in pages if uri.endswith(".md")}
+
+
+def test_site_has_a_notebook_of_each_tutorial_and_of_each_guide_with_python() -> None:
+    pages = site.written_pages()
+    notebooks = {Path(uri).stem: uri for uri in pages if uri.endswith(".ipynb")}
+    assert set(sources()) == set(notebooks)
+    assert 11 < len(notebooks)
+    for name, uri in notebooks.items():
+        page = pages[f"{uri.removesuffix('.ipynb')}.md"]
+        assert f"]({name}.ipynb)" in str(page).splitlines()[2]
 
 
 @pytest.mark.slow

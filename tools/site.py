@@ -26,6 +26,7 @@ from fleet2d.floorplan.native import native_schema
 from fleet2d.floorplan.rooms.room import ALSO_CALLED
 from fleet2d.scenario.schema import describe_components, schema
 from fleet2d.viewing.page_data import export_html
+from fleet2d.viewing.tutorials import notebook, sources
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -90,10 +91,12 @@ def main() -> None:
 def written_pages() -> dict[str, str | bytes]:
     """Return the pages that people wrote, and the files beside them."""
     pages: dict[str, str | bytes] = {}
+    guides = sources().values()
     for path in sorted(DOCS.rglob("*")):
         uri = path.relative_to(DOCS).as_posix()
         if path.suffix == ".md":
-            pages[uri] = page_of(f"docs/{uri}", uri)
+            page = page_of(f"docs/{uri}", uri)
+            pages |= with_notebook(path, uri, page) if path in guides else {uri: page}
         elif path.suffix == ".ipynb":
             pages |= tutorial_pages(path)
         elif path.is_file():
@@ -304,10 +307,10 @@ def python_pages() -> Iterator[tuple[str, str]]:
 
 def tutorial_pages(path: Path) -> dict[str, str | bytes]:
     """Return the page of a notebook with the outputs that it stores, its pictures, and the file."""
-    notebook = json.loads(path.read_text(encoding="utf-8"))
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
     files: dict[str, str | bytes] = {}
     lines = []
-    for number, cell in enumerate(notebook["cells"]):
+    for number, cell in enumerate(cells):
         source = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
             lines += [source, ""]
@@ -321,11 +324,18 @@ def tutorial_pages(path: Path) -> dict[str, str | bytes]:
                 lines += [f"![{''.join(data.get('text/plain', 'the figure'))}]({picture})", ""]
             else:
                 lines += ["```text", "".join(data["text/plain"]).rstrip(), "```", ""]
-    files[f"tutorials/{path.name}"] = path.read_text(encoding="utf-8")
-    text = "\n".join(lines)
     uri = f"tutorials/{path.stem}.md"
-    files[uri] = relinked(text, f"docs/tutorials/{path.name}", uri)
-    return files
+    page = relinked("\n".join(lines), f"docs/tutorials/{path.name}", uri)
+    return {**files, **with_notebook(path, uri, page)}
+
+
+def with_notebook(source: Path, uri: str, page: str) -> dict[str, str | bytes]:
+    """Return a page that links its notebook below the heading, and the notebook."""
+    heading, _, text = page.partition("\n")
+    name = source.stem
+    link = f"As a notebook: [download it]({name}.ipynb), or `fleet2d demo --tutorial {name}`."
+    file = f"{uri.removesuffix('.md')}.ipynb"
+    return {uri: f"{heading}\n\n{link}\n{text}", file: json.dumps(notebook(source), indent=1)}
 
 
 if __name__ == "__main__":

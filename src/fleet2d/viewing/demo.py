@@ -38,16 +38,26 @@ def demo(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the run; left out: a new temporary one.")
     ] = None,
-    view: Annotated[bool, typer.Option(help="Whether to open the page in the browser.")] = True,
+    view: Annotated[bool, typer.Option(help="Whether to open the page, or Jupyter.")] = True,
+    tutorial: Annotated[
+        str | None,
+        typer.Option(help="Write this tutorial or guide into the present folder, as a notebook."),
+    ] = None,
+    lists: Annotated[bool, typer.Option("--list", help="List all tutorials and guides.")] = False,
 ) -> None:
     """Simulate the bundled home, and tell what happened.
 
-    Then its page is shown in the browser (extra `view`), until Ctrl-C.
+    Then its page is shown in the browser (extra `view`), until Ctrl-C. With --tutorial nothing is
+    simulated: a notebook is written, and opened in Jupyter if that is installed.
 
     Examples:
       fleet2d demo
       fleet2d demo --no-view --out month
+      fleet2d demo --tutorial algorithm
     """
+    if lists or tutorial:
+        _teach(tutorial, opens=view)
+        return
     directory = out or Path(tempfile.mkdtemp(prefix="fleet2d-"))
     run = run_with_progress(set_up(None, None, directory, strict=False, quiet=True))
     for sentence in sentences(run):
@@ -65,6 +75,19 @@ def demo(
     from fleet2d.viewing.command import view as show_page
 
     show_page([str(directory)])
+
+
+def _teach(tutorial: str | None, *, opens: bool) -> None:
+    """Write and open a tutorial or a guide as a notebook; None: list all of them."""
+    from fleet2d.viewing.tutorials import open_in_jupyter, sources, title, write_notebook
+
+    if tutorial is None:
+        for name, source in sources().items():
+            typer.echo(f"{name:18} {title(source)}")
+        return
+    path = write_notebook(tutorial, Path())
+    if not (opens and open_in_jupyter(path)):
+        typer.echo(f"{path}: open it in your editor, or in Jupyter (pip install notebook)")
 
 
 def sentences(run: "Run") -> Iterator[str]:
