@@ -124,6 +124,13 @@ def test_page_of_the_gallery_is_that_of_its_pieces() -> None:
     assert gallery.page() == page, "run python -m tools.gallery"
 
 
+def test_first_page_and_gallery_lead_to_each_day_of_the_gallery_live() -> None:
+    days = [f"live/{piece.name}.html" for piece in gallery.PIECES if piece.at is not None]
+    pages = {uri: str(text) for uri, text in site.written_pages().items()}
+    assert ["month.html", *days] == re.findall(r'<option value="([^"]*)"', pages["index.md"])
+    assert days == re.findall(r"\]\((live/.*?)\)", pages["gallery.md"])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("piece", [pytest.param(p, id=p.name) for p in gallery.PIECES])
 def test_a_picture_of_the_gallery_shows_the_home_or_run_of_today(piece: gallery.Piece) -> None:

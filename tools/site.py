@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import typer
+from tools import gallery
 
 import fleet2d
 from fleet2d.bounds import BOUNDS
@@ -80,8 +81,10 @@ def main() -> None:
     """Write all pages and what they show into a folder, anew."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ROOT / "build" / "docs")
     shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    (folder / "live").mkdir(parents=True)
     export_html(fleet2d.run("bundled:family", seed=4), folder / "month.html")
+    for piece in days():
+        export_html(gallery.open_piece(piece), folder / "live" / f"{piece.name}.html")
     for uri, content in {**written_pages(), **generated_pages()}.items():
         path = folder / uri
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -101,6 +104,8 @@ def written_pages() -> dict[str, str | bytes]:
             pages |= tutorial_pages(path)
         elif path.is_file():
             pages[uri] = path.read_bytes()
+    pages["index.md"] = with_choice(str(pages["index.md"]))
+    pages["gallery.md"] = with_days(str(pages["gallery.md"]))
     for source in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
         pages[COPIES[source]] = page_of(source, COPIES[source])
     for uri, more in (("cli", commands_part()), ("components", components_part())):
@@ -122,6 +127,31 @@ def generated_pages() -> dict[str, str]:
         **dict(python_pages()),
         **examples,
     }
+
+
+def days() -> list[gallery.Piece]:
+    """Return the scenarios of the gallery, whose days the site has live."""
+    return [piece for piece in gallery.PIECES if piece.at is not None]
+
+
+def with_choice(page: str) -> str:
+    """Return the first page with a choice of what its frame shows, which is the month at first."""
+    options = [f'<option value="live/{piece.name}.html">{piece.title}</option>' for piece in days()]
+    change = "this.parentNode.nextElementSibling.src = this.value"
+    choice = f"""<p>Watch <select onchange="{change}">
+<option value="month.html">A month of the family</option>
+{"".join(options)}
+</select></p>
+"""
+    return page.replace("<iframe", f"{choice}<iframe")
+
+
+def with_days(page: str) -> str:
+    """Return the gallery with links to its days."""
+    for piece in days():
+        picture = f"](images/gallery/{piece.name}.webp)\n"
+        page = page.replace(picture, f"{picture}\n[Watch this day](live/{piece.name}.html)\n")
+    return page
 
 
 def page_of(source: str, uri: str) -> str:
