@@ -108,10 +108,10 @@ def test_state_saved_in_the_second_hour_goes_on_in_it() -> None:
 
 
 def test_exports_have_offsets(tmp_path: Path) -> None:
-    """CSV, JSON Lines and GeoJSON in local time; Parquet and Arrow in instants with the zone."""
+    """CSV and JSON Lines in local time; Parquet and Arrow in instants with the zone."""
     run = fleet2d.run("bundled:family", BERLIN, AUTUMN, "simulation.duration=5 h", seed=4)
     from fleet2d.live.exporters import Selection
-    from fleet2d.live.exporters.texts import export_csv, export_geojson, export_jsonl
+    from fleet2d.live.exporters.texts import export_csv, export_jsonl
 
     part = Selection.of(run, every="1 h")
     export_csv(run, tmp_path / "a.csv", part)
@@ -127,8 +127,6 @@ def test_exports_have_offsets(tmp_path: Path) -> None:
     begin = datetime(2026, 10, 24, 21, tzinfo=UTC)
     steps = [row["step"] for row in rows if row["time"]]
     assert [(moment - begin) // timedelta(seconds=1) for moment in moments] == steps
-    export_geojson(run, tmp_path / "a.geojson", part)
-    assert '"time": "2026-10-24T23:00:00+02:00"' in (tmp_path / "a.geojson").read_text()
     assert str(run.arrow("events").schema.field("time").type) == "timestamp[us, tz=Europe/Berlin]"
 
 

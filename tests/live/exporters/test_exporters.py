@@ -57,7 +57,7 @@ def test_suffix_of_no_format_is_refused_with_those_there_are(tmp_path: Path, fle
 
     code, _, err = fleet2d("export", run, "week.xlsx")
 
-    assert (2, True) == (code, "no format has the suffix '.xlsx'" in err and ".geojson" in err)
+    assert (2, True) == (code, "no format has the suffix '.xlsx'" in err and ".jsonl" in err)
 
 
 def test_command_writes_a_part_of_a_run(tmp_path: Path, fleet2d: Cli) -> None:

@@ -1,13 +1,12 @@
-"""CSV, JSON Lines and GeoJSON have the poses and the rows that the run stored."""
+"""CSV and JSON Lines have the poses and the rows that the run stored."""
 
 import json
 from pathlib import Path
 
 import pandas as pd
-from shapely.geometry import LineString, Point
 from tests.live.exporters.worlds import NAMES, day, part, poses, rows
 
-from fleet2d.live.exporters.texts import export_csv, export_geojson, export_jsonl
+from fleet2d.live.exporters.texts import export_csv, export_jsonl
 
 
 def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path: Path) -> None:
@@ -40,22 +39,3 @@ def test_json_lines_have_all_records_in_order_of_time(tmp_path: Path) -> None:
         for one in found:
             del one["record"]
         assert [row | {"time": row["time"].isoformat()} for row in expected] == found
-
-
-def test_geojson_has_the_home_the_ways_and_the_events(tmp_path: Path) -> None:
-    path = tmp_path / "day.geojson"
-    export_geojson(day(), path, part())
-
-    features = json.loads(path.read_text())["features"]
-    ways = [f for f in features if f["properties"]["kind"] == "way"]
-    seen = {point for f in ways for point in map(tuple, f["geometry"]["coordinates"])}
-    walked = {(round(x, 4), round(y, 4)) for name in NAMES for _, x, y, _ in poses(name)}
-    assert seen <= walked
-    assert all(LineString(f["geometry"]["coordinates"]).length > 0 for f in ways)
-    events = [f for f in features if f["properties"]["kind"] == "event"]
-    assert len(rows("events")) == len(events)
-    free = [f for f in features if f["properties"]["kind"] == "free"]
-    assert free
-    places = [Point(f["geometry"]["coordinates"]) for f in events if f["geometry"]]
-    assert places
-    assert all(day().plan.room_at(place.x, place.y) is not None for place in places)
