@@ -12,6 +12,9 @@ from pathlib import Path
 
 from fleet2d.errors import Fleet2DError, InputError
 
+PACKAGE = Path(__file__).resolve().parent
+"""The folder of Fleet2D's code, and of the scenarios, personas and tables that come with it."""
+
 # A pipe that takes a file's place after the check doesn't block; nor is a link followed then.
 _SAFELY = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
 
