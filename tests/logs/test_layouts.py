@@ -316,6 +316,29 @@ def test_layouts_are_recognized_by_content_and_folders_by_their_files(tmp_path: 
         assert read_log(folder, **keys).layout == name
 
 
+def test_an_end_before_its_beginning_is_told_of_sensors_and_activities(tmp_path: Path) -> None:
+    """It was taken for an instant without a note."""
+    begin, end = "02-Mar-2026 08:00:00", "02-Mar-2026 07:00:00"
+    for kind in ("ss", "as"):
+        written(tmp_path / f"kast_houseB-{kind}.txt", [f"{begin}\t{end}\t1"])
+
+    log = read_log(tmp_path, "kasteren")
+
+    ignored = "an end before the beginning is ignored, in line 1"
+    assert log.notes == tuple(f"kast_houseB-{kind}.txt: {ignored}" for kind in ("ss", "as"))
+    assert isinstance(log, ActivityLog)
+    assert {(r.begin_us, r.end_us) for r in log.readings} == {(8 * 3600 * S, 8 * 3600 * S)}
+
+
+def test_a_number_with_two_names_is_refused(tmp_path: Path) -> None:
+    row = "02-Mar-2026 08:00:00\t02-Mar-2026 09:00:00\t1"
+    path = written(tmp_path / "kast_houseB-ss.txt", [row])
+    written(tmp_path / "kast_sensorMapB.txt", ["1,Fridge,x", "2,Door,x", "1,Fridge,y", "1,Bath,x"])
+
+    with pytest.raises(LogError, match=r"kast_sensorMapB\.txt, line 4: 1 is 'Fridge' already"):
+        read_log(path)
+
+
 def test_an_absence_of_days_is_normal(tmp_path: Path) -> None:
     lines = ["02-Mar-2026 08:00:00\t06-Mar-2026 20:00:00\t1"]
     written(tmp_path / "kast_actionMapB.txt", ["1,leave-house"])

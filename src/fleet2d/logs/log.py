@@ -3,7 +3,7 @@
 import codecs
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta, timezone
 from io import TextIOWrapper
@@ -303,16 +303,21 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
                 f"{path}, line {reading.line}: it lasts {lasts / 3.6e9:.1f} h; a reading lasts a"
                 " day at most: check its end"
             )
-    notes = []
-    wrong = [str(reading.line) for reading in readings if reading.end_us < reading.begin_us]
-    if wrong:
-        more = f" and {len(wrong) - _MAX_NAMED} more" if len(wrong) > _MAX_NAMED else ""
-        lines = f"{', '.join(wrong[:_MAX_NAMED])}{more}"
-        notes.append(f"an end before the beginning is ignored, in line {lines}")
+    notes = wrong_ends(readings)
     if early:
         readings = sorted(readings, key=lambda reading: reading.begin_us)  # stable
         notes.append(f"{counted(len(early), 'line')} ran backwards in time and were sorted in")
     return [r._replace(end_us=max(r.end_us, r.begin_us)) for r in readings], notes
+
+
+def wrong_ends(readings: Sequence[Reading]) -> list[str]:
+    """Return a note about readings that end before they begin, if there are any."""
+    wrong = [str(reading.line) for reading in readings if reading.end_us < reading.begin_us]
+    if not wrong:
+        return []
+    more = f" and {len(wrong) - _MAX_NAMED} more" if len(wrong) > _MAX_NAMED else ""
+    lines = f"{', '.join(wrong[:_MAX_NAMED])}{more}"
+    return [f"an end before the beginning is ignored, in line {lines}"]
 
 
 def parse_time(text: str, path: Path, line: int, *, day_first: bool | None = None) -> datetime:

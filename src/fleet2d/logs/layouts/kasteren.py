@@ -16,7 +16,16 @@ from pathlib import Path
 from fleet2d.bounds import one_line
 from fleet2d.logs.layouts.clock import by_clock
 from fleet2d.logs.layouts.intervals import is_leaving, label_by_activities
-from fleet2d.logs.log import AWAY, ActivityLog, LogError, Reading, in_order, log_lines, since
+from fleet2d.logs.log import (
+    AWAY,
+    ActivityLog,
+    LogError,
+    Reading,
+    in_order,
+    log_lines,
+    since,
+    wrong_ends,
+)
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.runtime.local_time import Zone
 
@@ -55,6 +64,7 @@ def read_kasteren(path: Path, *, sort: bool = False, zone: Zone | None = None) -
         if kind == "sensors":
             readings = _switches(rows)
             sensors, order_notes = in_order(readings, file, sort=sort)
+            order_notes = wrong_ends(rows) + order_notes
             notes += _stuck_notes(file, rows)
         else:
             activities, order_notes = in_order(rows, file, sort=sort)
@@ -70,9 +80,9 @@ def _switches(rows: list[Reading]) -> list[Reading]:
     readings = []
     for row in rows:
         if _PRESENCE.search(row.room) and not _is_stuck(row):
-            readings.append(row._replace(activity=""))
+            readings.append(row._replace(end_us=max(row.begin_us, row.end_us), activity=""))
             continue
-        switches = dict.fromkeys((row.begin_us, row.end_us))
+        switches = dict.fromkeys((row.begin_us, max(row.begin_us, row.end_us)))
         readings += [Reading(time_us, time_us, row.room, "", row.line) for time_us in switches]
     # A line is two instants, which overlap those of other lines.
     return sorted(readings, key=lambda reading: reading.begin_us)
@@ -98,7 +108,7 @@ def _rows(path: Path, first_day: date, names: Mapping[str, str]) -> list[Reading
         name = names.get(key, key)
         name = _NIGHT if name == _GOING_TO_BED else name
         begin_us = since(first_day, begin)
-        end_us = max(begin_us, since(first_day, end))
+        end_us = since(first_day, end)
         rows.append(Reading(begin_us, end_us, AWAY if is_leaving(name) else name, name, number))
     return rows
 
@@ -166,5 +176,12 @@ def _names(path: Path, kind: str) -> Mapping[str, str]:
     maps = [file for file in sorted(path.parent.glob("*.txt")) if pattern.search(file.stem)]
     if not maps:
         return {}
-    matches = (_NAME.fullmatch(text) for _, text in log_lines(maps[0]))
-    return {match[1]: match[2] for match in matches if match}
+    names: dict[str, str] = {}
+    for line, text in log_lines(maps[0]):
+        match = _NAME.fullmatch(text)
+        if match is None:
+            continue
+        number, name = match.groups()
+        if names.setdefault(number, name) != name:
+            raise LogError(f"{maps[0]}, line {line}: {number} is {names[number]!r} already")
+    return names
