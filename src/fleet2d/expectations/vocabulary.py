@@ -11,6 +11,7 @@ from dataclasses import field
 from typing import Any, get_args
 
 import numpy as np
+import shapely
 from pydantic_core import PydanticCustomError
 
 from fleet2d.algorithms.observations import ROBOT
@@ -42,6 +43,7 @@ from fleet2d.expectations.signals import (
     SignalBlock,
     WordSignal,
 )
+from fleet2d.expectations.storeys import apart, only_on, storey_of
 from fleet2d.floorplan.home import Home, lattice_footprint
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.placed_objects import PlacedObject
@@ -50,7 +52,6 @@ from fleet2d.kernels import (
     I64,
     Bool,
     SightingColumn,
-    distances_between,
     distances_to_shape,
     rooms_at,
     speeds,
@@ -76,7 +77,7 @@ class distance(NumberSignal):
     """The distance of a body from another, a room, an object or a point [m].
 
     It is measured from the centre of a body to the nearest point of a room or object: 0 inside.
-    Infinite while a body is away from home.
+    Infinite while a body is away from home, or on another storey.
     """
 
     body: str
@@ -119,16 +120,26 @@ class distance(NumberSignal):
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the distances over a block of steps."""
-        (row, other, shape, edges), home = gauge.memory, block.home
-        window = block.bodies.window(block.first, block.end)
-        if other is None:
-            if (now := self._shape(home)) != shape:
-                edges = self._edges(home, now)
-                gauge.memory = row, other, now, edges
-            start, value = distances_to_shape(window, row, edges)
+        row, other, shape, sides = gauge.memory
+        home = block.home
+        if other is not None:
+            trace = apart(block, row, other)
         else:
-            start, value = distances_between(window, row, other)
-        return Trace(start, value / home.plan.lattice.units_per_m, block.end)
+            if (now := self._shape(home)) != shape:
+                sides = self._sides(home, now)
+                gauge.memory = row, other, now, sides
+            trace = self._from_place(block, row, sides)
+        return Trace(trace.start, trace.value / home.plan.lattice.units_per_m, block.end)
+
+    @staticmethod
+    def _from_place(block: SignalBlock, row: int, sides: list[tuple[int | None, I64]]) -> Trace:
+        """Return the distance from the nearest part of a place on the storey of a body."""
+        window = block.bodies.window(block.first, block.end)
+        traces = []
+        for storey, edges in sides:
+            trace = Trace(*distances_to_shape(window, row, edges), block.end)
+            traces.append(trace if storey is None else only_on(storey, trace, block, row))
+        return combine(lambda *metres: np.min(metres, axis=0), *traces)
 
     def _shape(self, home: Home) -> PlacedObject | list[int] | tuple[float, float]:
         """Return the present place: an object, the numbers of rooms, or a point."""
@@ -138,6 +149,26 @@ class distance(NumberSignal):
         rooms = [room.index for room in home.rooms if room.is_called(kind)]
         is_object = any(item.name == self.other for item in home.objects)
         return home.object(kind) if is_object and not rooms else rooms
+
+    @classmethod
+    def _sides(
+        cls, home: Home, shape: PlacedObject | list[int] | tuple[float, float]
+    ) -> list[tuple[int | None, I64]]:
+        """Return the edges of a place on each storey, with its number; None: there is only one."""
+        plan = home.plan
+        if not plan.portals or shape == []:
+            return [(None, cls._edges(home, shape))]
+        to_lattice = plan.lattice.to_lattice
+        if isinstance(shape, tuple):
+            place = shapely.Point(to_lattice(shape))
+            return [(storey_of(plan, place), cls._edges(home, shape))]
+        if isinstance(shape, list):
+            rooms: dict[int, list[int]] = {}
+            for number in shape:
+                anchor = shapely.Point(to_lattice(home.rooms[number].anchor_xy))
+                rooms.setdefault(storey_of(plan, anchor), []).append(number)
+            return [(storey, cls._edges(home, of_it)) for storey, of_it in rooms.items()]
+        return [(storey_of(plan, lattice_footprint(plan, shape)), cls._edges(home, shape))]
 
     @staticmethod
     def _edges(home: Home, shape: PlacedObject | list[int] | tuple[float, float]) -> I64:
@@ -409,8 +440,7 @@ class nearest(WordSignal):
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the row of the nearest one, the first of equals; -1 if there is none."""
         row, rows = gauge.memory
-        window = block.bodies.window(block.first, block.end)
-        traces = [Trace(*distances_between(window, row, other), block.end) for other in rows]
+        traces = [apart(block, row, other) for other in rows]
 
         def first_of(*distances: F64) -> F64:
             table = np.stack(distances)

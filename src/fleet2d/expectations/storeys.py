@@ -1,0 +1,48 @@
+"""Storeys: they lie side by side in a plan, so that what is near there may be far away."""
+
+import numpy as np
+import shapely
+
+from fleet2d.expectations.expectation import INFINITE, Trace, combine, shortest
+from fleet2d.expectations.signals import SignalBlock
+from fleet2d.floorplan.plan import FloorPlan
+from fleet2d.kernels import F64, distances_between
+
+
+def storey_of(plan: FloorPlan, place: shapely.Geometry) -> int:
+    """Return the number of the part of the free space at which a place is [lattice]."""
+    return int(shapely.distance(np.array(plan.polygons), place).argmin())
+
+
+def storeys(block: SignalBlock, row: int) -> Trace:
+    """Return the number of the part of the free space in which a body is."""
+    window = block.bodies.window(block.first, block.end)
+    x, y, *_ = window.dense(row, block.first, block.end)
+    is_new = np.append(True, (np.diff(x) != 0) | (np.diff(y) != 0))
+    start = np.flatnonzero(is_new)
+    points = shapely.points(x[start], y[start])
+    parts = np.array(block.home.plan.polygons)
+    number = shapely.distance(parts[:, np.newaxis], points).argmin(axis=0)
+    return shortest(start + block.first, number.astype(np.float64), block.end)
+
+
+def only_on(storey: int, distance: Trace, block: SignalBlock, row: int) -> Trace:
+    """Return the distance of a body from a place on a storey: from others it is infinite."""
+
+    def masked(metres: F64, number: F64) -> F64:
+        return np.where(number == storey, metres, INFINITE)
+
+    return combine(masked, distance, storeys(block, row))
+
+
+def apart(block: SignalBlock, row: int, other: int) -> Trace:
+    """Return the distance between two bodies [lattice]: on two storeys it is infinite."""
+    window = block.bodies.window(block.first, block.end)
+    distance = Trace(*distances_between(window, row, other), block.end)
+    if not block.home.plan.portals:
+        return distance
+
+    def masked(metres: F64, one: F64, two: F64) -> F64:
+        return np.where(one == two, metres, INFINITE)
+
+    return combine(masked, distance, storeys(block, row), storeys(block, other))

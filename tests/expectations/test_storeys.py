@@ -1,0 +1,117 @@
+"""Distances between storeys: what lies side by side in the plan isn't near."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import fleet2d
+
+
+def box(x: float) -> list[list[float]]:
+    return [[x, 0], [x + 5, 0], [x + 5, 4], [x, 4]]
+
+
+PLAN = {
+    "format": "fleet2d-floorplan",
+    "version": 1,
+    "free": [box(0), box(6)],
+    "rooms": [
+        {"name": "below", "type": "living_room", "polygon": box(0)},
+        {"name": "above", "type": "bedroom", "polygon": box(6)},
+    ],
+    "objects": [
+        {"name": "sofa", "type": "sofa", "footprint": [[4.2, 3], [5, 3], [5, 4], [4.2, 4]]},
+    ],
+    "portals": [{"type": "stairs", "start": [0.5, 3.5], "end": [10.5, 3.5], "takes": 10}],
+    "entrance": [0.5, 0.5],
+}
+
+
+def verdicts(
+    tmp_path: Path, *, stairs: bool = True, **expected: str
+) -> dict[str, list[tuple[int, int]]]:
+    """Return when what is expected of a minute is violated.
+
+    Ana stands above, and from second 30 on below; luna above, astro below.
+    """
+    path = tmp_path / "house.json"
+    plan = PLAN if stairs else {key: PLAN[key] for key in PLAN if key != "portals"}
+    path.write_text(json.dumps(plan))
+    robot = {"behaviors": []}
+    run = fleet2d.run(
+        {
+            "simulation": {"duration": "1 min"},
+            "floorplan": {"type": "native", "path": str(path)},
+            "users": {"ana": {"type": "live", "start": [6.5, 2.0]}},
+            "robots": {
+                "astro": robot | {"start": [4.5, 2.0]},
+                "luna": robot | {"start": [10.5, 2.0]},
+            },
+            "script": [{"at": "30 s", "put": "ana", "to": [3.5, 2.0]}],
+            "expect": expected,
+        }
+    )
+    found: dict[str, list[tuple[int, int]]] = {name: [] for name in expected}
+    for row in run.tables["violations"].to_pylist():
+        found[row["expectation"]].append((row["step"], row["last_step"]))
+    return found
+
+
+def test_bodies_and_places_of_two_storeys_are_far_apart(tmp_path: Path) -> None:
+    found = verdicts(
+        tmp_path,
+        body="never(distance(astro, ana) < 3 m)",
+        room="never(distance(astro, above) < 3 m)",
+        point="never(distance(astro, (6.5, 2)) < 3 m)",
+        sofa="never(distance(ana, sofa) < 3 m)",
+    )
+
+    assert found == {"body": [(30, 59)], "room": [], "point": [], "sofa": [(30, 59)]}
+
+
+def test_a_place_of_the_same_storey_is_as_far_as_ever(tmp_path: Path) -> None:
+    found = verdicts(
+        tmp_path,
+        room="always(distance(luna, above) == 0)",
+        point="always(distance(astro, (1.5, 2)) == 3 m)",
+        kinds="eventually(distance(ana, sofa) < 1.5 m)",
+    )
+
+    assert found == {"room": [], "point": [], "kinds": []}
+
+
+def test_the_nearest_is_on_the_same_storey(tmp_path: Path) -> None:
+    found = verdicts(
+        tmp_path,
+        above="always(implies(room(ana) == above, nearest(ana) == luna))",
+        below="always(implies(room(ana) == below, nearest(ana) == astro))",
+    )
+
+    assert found == {"above": [], "below": []}
+
+
+def test_without_portals_the_plan_is_one_storey(tmp_path: Path) -> None:
+    found = verdicts(tmp_path, stairs=False, body="never(distance(astro, ana) < 3 m)")
+
+    assert found == {"body": [(0, 59)]}
+
+
+@pytest.mark.parametrize("max_span", [1, 7])
+def test_spans_change_no_distance(tmp_path: Path, max_span: int) -> None:
+    expected = {"near": "always(distance(astro, ana) < 1.5 m)"}
+    path = tmp_path / "house.json"
+    path.write_text(json.dumps(PLAN))
+    content = {
+        "extends": "bundled:paper",
+        "simulation": {"duration": "20 min", "start": "2026-01-05T08:00"},
+        "floorplan": {"type": "native", "path": str(path)},
+        "users": {"ana": {"type": "meander"}},
+        "robots": {"astro": {"behaviors": [], "keep_out": []}},
+        "expect": expected,
+    }
+    whole = fleet2d.run(content)
+    short = fleet2d.run(content, f"simulation.max_span={max_span}")
+
+    assert whole.digest == short.digest
+    assert whole.tables["violations"].equals(short.tables["violations"])
