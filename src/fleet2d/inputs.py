@@ -1,34 +1,60 @@
 """Input files: what a command line, a scenario or a stored folder names, and how it is opened.
 
 What is opened decides, however it is named: links are followed first, and what isn't a regular file
-is refused, since a pipe may never answer.
+is refused, since a pipe may never answer. Within a root, nothing outside of it is opened.
 """
 
 import hashlib
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from io import BufferedReader
 from pathlib import Path
 
 from fleet2d.errors import Fleet2DError, InputError
 
 PACKAGE = Path(__file__).resolve().parent
-"""The folder of Fleet2D's code, and of the scenarios, personas and tables that come with it."""
+"""Scenarios, personas and tables that come with Fleet2D, which are read within any root."""
 
+_ROOT: ContextVar[Path | None] = ContextVar("root", default=None)
 # A pipe that takes a file's place after the check doesn't block; nor is a link followed then.
 _SAFELY = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+
+
+@contextmanager
+def within(root: Path) -> Iterator[None]:
+    """Within the context, refuse input files outside of a folder.
+
+    Example:
+        >>> with within(Path("homes").resolve()):
+        ...     open_input(Path("homes/../secret.yaml"))
+        Traceback (most recent call last):
+        fleet2d.errors.InputError: homes/../secret.yaml is outside of the folder ...
+    """
+    token = _ROOT.set(root.resolve())
+    try:
+        yield
+    finally:
+        _ROOT.reset(token)
 
 
 def resolved(path: Path | str, error: type[Fleet2DError] = InputError) -> Path:
     """Return a path with links followed; nothing needs to exist there.
 
     Raises:
-        Fleet2DError: No file can have such a name; of the type `error`.
+        Fleet2DError: It leads out of the root, or no file can have such a name; of the type
+            `error`.
     """
     try:
-        return Path(os.path.realpath(path))
+        real = Path(os.path.realpath(path))
     except ValueError:  # a null character, or half of a surrogate pair
         raise error(f"{str(path)!r} can't be the name of a file") from None
+    root = _ROOT.get()
+    if root is None or real.is_relative_to(root) or real.is_relative_to(PACKAGE):
+        return real
+    raise error(f"{path} is outside of the folder {root}: copy it into the folder")
 
 
 def input_path(path: Path | str, error: type[Fleet2DError] = InputError) -> Path:
@@ -36,7 +62,8 @@ def input_path(path: Path | str, error: type[Fleet2DError] = InputError) -> Path
 
     Raises:
         OSError: There is none.
-        Fleet2DError: It is a device, a pipe or a socket; of the type `error`.
+        Fleet2DError: It leads out of the root, or is a device, a pipe or a socket; of the type
+            `error`.
     """
     real = resolved(path, error)
     mode = real.stat().st_mode
@@ -50,7 +77,8 @@ def open_input(path: Path | str, error: type[Fleet2DError] = InputError) -> Buff
 
     Raises:
         OSError: It can't be opened, or is a folder.
-        Fleet2DError: It is a device, a pipe or a socket; of the type `error`.
+        Fleet2DError: It leads out of the root, or is a device, a pipe or a socket; of the type
+            `error`.
     """
     real = input_path(path, error)
     file = open(real, "rb", opener=_open_safely)  # noqa: SIM115 - the caller closes it
@@ -69,7 +97,7 @@ def sha256_of_file(path: Path | str) -> str:
 
     Raises:
         OSError: It can't be read.
-        InputError: It is a device, a pipe or a socket.
+        InputError: It leads out of the root, or is a device, a pipe or a socket.
     """
     with open_input(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

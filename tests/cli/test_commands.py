@@ -63,7 +63,7 @@ def test_help_lists_the_commands_in_groups_the_most_used_first(fleet2d: Cli) -> 
     for heading, names in GROUPS.items():
         assert list(names) == [line.split()[0] for line in sections[heading]]
     assert 3 == len(sections["Examples"])
-    assert 17 == sum(map(len, GROUPS.values()))
+    assert 18 == sum(map(len, GROUPS.values()))
 
 
 @pytest.mark.parametrize("words", [(), ("study",), ("fit",), ("dataset",)])

@@ -118,6 +118,8 @@ LACKING = [
     ("live home.yaml --with ws://127.0.0.1:0 --speed 0", "", "live"),
     ("live home.yaml --with rosbridge://127.0.0.1:9 --speed 0", "", "rosbridge"),
     ("live home.yaml --with mqtt://127.0.0.1:9/x --speed 0", "", "mqtt"),
+    ("mcp .", "", "mcp"),
+    ("mcp .", "mcp", "mcp"),
     ("run network.yaml --out net", "", "onnx"),
     ("fit perception log.csv", "", "calibrate"),
     ("validate floorplan.type=svg floorplan.path=plan.svg", "", "svg"),

@@ -269,6 +269,18 @@ def test_a_row_that_jitters_in_the_doubled_hour_is_refused_as_in_any_other(tmp_p
     assert [t // 60_000_000 for t in log.time_us.tolist()] == [130, 130, 160]
 
 
+def test_questions_about_a_run_are_in_local_time() -> None:
+    """Of an assistant, by DuckDB."""
+    pytest.importorskip("duckdb")
+    from fleet2d.live.questions import answer
+
+    run = fleet2d.run("bundled:family", BERLIN, AUTUMN, "simulation.duration=5 h", seed=4)
+    query = "SELECT step, time FROM key_frames WHERE hour(time) = 2 ORDER BY step"
+    rows = answer(dict(run.tables), query, 500)["shown"]
+    assert rows
+    assert all(str(row["time"]).replace("T", " ").startswith("2026-10-25 02:") for row in rows)
+
+
 def test_beliefs_of_a_run_are_replayed_at_their_moments(tmp_path: Path) -> None:
     """Its own table has instants, which need no time zone."""
     keys = [BERLIN, AUTUMN, "simulation.duration=5 h", "algorithms.ltp.period=30 min"]

@@ -210,6 +210,20 @@ INPUTS = [
         "",
         "test_inputs.py::test_a_link_in_place_of_a_checked_file_is_not_followed",
     ),
+    Defence(
+        "it is within the root",
+        "inputs",
+        "if root is None or real.is_relative_to(root) or real.is_relative_to(PACKAGE):",
+        "if True:",
+        "test_inputs.py::test_paths_out_of_a_root_are_refused",
+    ),
+    Defence(
+        "links are followed before",
+        "inputs",
+        "real = Path(os.path.realpath(path))",
+        "real = Path(os.path.abspath(path))",
+        "test_inputs.py::test_paths_out_of_a_root_are_refused",
+    ),
 ]
 STORED = [
     Defence(
@@ -413,6 +427,71 @@ CHILD = [
         "storage/test_apart.py::test_wrong_answer_is_an_error_of_one_line",
     ),
 ]
+ASSISTANT = [
+    Defence(
+        "an assistant is kept in its folder",
+        "live.assistant",
+        "with place.lock, within(place.folder), running_code(allowed=False):",
+        "with place.lock, running_code(allowed=False):",
+        "live/test_assistant.py::test_nothing_outside_is_quoted_in_a_message",
+    ),
+    Defence(
+        "its scenarios run no code",
+        "live.assistant",
+        "with place.lock, within(place.folder), running_code(allowed=False):",
+        "with place.lock, within(place.folder):",
+        "live/test_assistant.py::test_files_outside_and_code_are_refused",
+    ),
+    Defence(
+        "its names stay in the folder",
+        "live.assistant",
+        "if not path.is_relative_to(self.folder) or path == self.folder:",
+        "if False:",
+        "live/test_assistant.py::test_paths_out_of_the_folder_are_refused",
+    ),
+    Defence(
+        "a query has listed functions only",
+        "live.questions",
+        'check_known(node["function_name"], "function", FUNCTIONS, InputError)',
+        "pass",
+        "live/test_questions.py::test_a_query_reads_and_changes_nothing_else",
+    ),
+    Defence(
+        "a query is one SELECT",
+        "live.questions",
+        'if len(tree["statements"]) != 1:',
+        "if False:",
+        "live/test_questions.py::test_what_is_not_there_is_an_error",
+    ),
+    Defence(
+        "it reads the tables of the run only",
+        "live.questions",
+        'check_known(name.lower(), "table", known, InputError)',
+        "pass",
+        "live/test_questions.py::test_a_query_reads_and_changes_nothing_else",
+    ),
+    Defence(
+        "DuckDB opens no files, and finds no variables of Python",
+        "live.questions",
+        '"enable_external_access": "false",',
+        "",
+        "live/test_questions.py::test_the_database_itself_is_closed",
+    ),
+    Defence(
+        "the settings of DuckDB are locked",
+        "live.questions",
+        '"lock_configuration": "true",',
+        "",
+        "live/test_questions.py::test_the_database_itself_is_closed",
+    ),
+    Defence(
+        "a query has limited memory",
+        "live.questions",
+        '"memory_limit": "1GB",',
+        '"memory_limit": "100GB",',
+        "live/test_questions.py::test_the_database_itself_is_closed",
+    ),
+]
 TERMINAL = [
     Defence(
         "messages have no escapes",
@@ -518,6 +597,6 @@ WRITING = [
     ),
 ]
 DEFENCES = [
-    *CHECKPOINTS, *CODE, *FOLDERS, *INPUTS, *STORED, *BOUNDS, *CHILD, *TERMINAL, *PAGE,
+    *CHECKPOINTS, *CODE, *FOLDERS, *INPUTS, *STORED, *BOUNDS, *CHILD, *ASSISTANT, *TERMINAL, *PAGE,
     *WRITING,
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Examples of programs that decide for a robot: a behavior tree, a planner."""
+"""Examples of programs that decide for a robot: a behavior tree, a planner, a language model."""
 
 import runpy
 from pathlib import Path
@@ -25,6 +25,16 @@ def test_a_plan_of_pddl_is_carried_out(capsys: pytest.CaptureFixture[str]) -> No
     assert lines == sorted(lines)  # times
 
 
+def test_a_language_model_answers_from_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mcp", reason="the extra mcp is not installed")
+    runpy.run_path(str(EXAMPLES / "talk.py"))
+    *calls, answer = capsys.readouterr().out.splitlines()
+    assert [call.partition(":")[0] for call in calls] == [
+        "components", "write", "check", "run", "stays",
+    ]  # fmt: skip
+    assert answer.startswith("She sleeps 10.")
+
+
 def test_each_is_short() -> None:
-    for name in ("tree", "plan"):
+    for name in ("tree", "plan", "talk"):
         assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) <= 60

@@ -30,7 +30,7 @@ COMMANDS = {
 }
 """The module of each command of this package."""
 GROUPS = {
-    "Run": ("run", "demo", "resume", "live"),
+    "Run": ("run", "demo", "resume", "live", "mcp"),
     "Look": ("view", "show", "export"),
     "Test": ("test", "falsify", "verify"),
     "Experiment": ("study", "transfer"),

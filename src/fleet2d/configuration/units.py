@@ -58,8 +58,8 @@ def named_path(name: str | Path) -> Path:
     """Return the path of an input file; a relative one starts from the folder of its text.
 
     Raises:
-        PydanticCustomError: No file can have such a name, or it begins with the home of an unknown
-            user.
+        PydanticCustomError: It leads out of the root of input files, no file can have such a name,
+            or it begins with the home of an unknown user.
     """
     with errors_as(problem, of=(InputError, RuntimeError)):
         path = folder_of(name) / Path(name).expanduser()

@@ -45,6 +45,22 @@ def check_intervention(simulation: Simulation, act: Mapping[str, Any]) -> None:
     parse_intervention(act).check(EngineWorld(simulation._state, simulation.step))
 
 
+def stop(simulation: Simulation) -> None:
+    """End what another thread simulates after the present span, as Ctrl-C does.
+
+    Example:
+        >>> import contextlib, threading
+        >>> import fleet2d
+        >>> simulation = fleet2d.Simulation(None, "simulation.speedup=1", seed=4)
+        >>> threading.Timer(0.1, stop, [simulation]).start()
+        >>> with contextlib.suppress(KeyboardInterrupt):
+        ...     simulation.advance(1000)
+        >>> simulation.step < 1000
+        True
+    """
+    simulation._loop.stop()
+
+
 def run_until_asked(simulation: Simulation, *names: str) -> list[str]:
     """Simulate until the first behavior of one of some robots has to choose; see `Policy`.
 

@@ -1,6 +1,7 @@
-"""`fleet2d live`: runs in real time among other programs."""
+"""Commands for other programs: live, mcp."""
 
 import json
+import os
 import re
 from functools import partial
 from pathlib import Path
@@ -90,3 +91,22 @@ def live(
         if out is not None:
             tell(resume_hint(simulation.time, out))
         raise typer.Exit(130)
+
+
+def mcp(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="The only folder that is read and written.")
+    ],
+) -> None:
+    """Serve AI assistants within one folder.
+
+    They speak the Model Context Protocol on stdin and stdout.
+
+    Examples:
+      fleet2d mcp experiments
+    """
+    from fleet2d.live.assistant import server
+
+    app = server(folder)
+    os.chdir(folder)  # where relative paths in overrides and interventions start
+    app.run("stdio")

@@ -181,6 +181,10 @@ _FORMATS = {
         "The readings of a run's sensors as a text file in the layout of the CASAS smart homes.",
     ),
     "csv": ("texts", "Poses of all users and robots as CSV: a row for each body and time."),
+    "home_assistant": (
+        "home_assistant",
+        "The database of a Home Assistant's recorder: rooms of people and robots, sensors.",
+    ),
     "jsonl": (
         "texts",
         "JSON Lines: an object for each pose, event, observation and row of a table, in order of"
@@ -203,7 +207,7 @@ _FORMATS = {
 """The module of each format, and what it is."""
 
 # Formats whose files have another suffix than the name of the format.
-_SUFFIXES = {".txt": "casas", "": "rosbag2"}
+_SUFFIXES = {".txt": "casas", ".db": "home_assistant", "": "rosbag2"}
 
 
 def export(
@@ -258,7 +262,7 @@ def format_of(path: Path) -> str:
         suffixes = ", ".join(f".{own}" for own in formats() if own not in _SUFFIXES.values())
         raise InputError(
             f"{path}: no format has the suffix {path.suffix!r}: name the format by --format, or"
-            f" write a file with one of {suffixes}, .txt, or a folder"
+            f" write a file with one of {suffixes}, .txt, .db, or a folder"
         )
     return name
 
