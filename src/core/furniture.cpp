@@ -28,24 +28,50 @@ CellBox unturned(const CellBox& box, int turn, std::array<i64, 2> shape) {
     }
 }
 
-// The number of cells of a mask in a box, by the mask's corner_sums.
-i64 count_in(View<const i32, 2> sums, const CellBox& box) {
-    const i64 top = box.row + box.high, right = box.column + box.wide;
-    return i64{sums(top, right)} - sums(box.row, right) - sums(top, box.column) + sums(box.row, box.column);
-}
+// corner_sums of a mask, read in the window that is turned by so many quarters.
+class TurnedSums {
+public:
+    TurnedSums(View<const i32, 2> sums, int turn) : sign_(turn % 2 == 0 ? 1 : -1) {
+        const i64 up = sums.stride[0], last_row = sums.shape[0] - 1, last_column = sums.shape[1] - 1;
+        constexpr std::array<std::array<i64, 2>, TURNS> along_row{{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
+        const auto ahead = along_row[static_cast<std::size_t>((turn + 1) % TURNS)];
+        const auto along = along_row[static_cast<std::size_t>(turn)];
+        across_ = ahead[0] * up + ahead[1];
+        along_ = along[0] * up + along[1];
+        const i64 row = turn == 2 || turn == 3 ? last_row : 0, column = turn == 1 || turn == 2 ? last_column : 0;
+        first_ = sums.data + row * up + column;
+    }
 
-// corner_sums of the cells of a mask that aren't occupied.
-Array<i32, 2> empty_sums(View<const bool, 2> mask, View<const bool, 2> occupied) {
+    // The number of cells of the mask in a box of the turned window.
+    i64 count(const CellBox& box) const {
+        const i32* const low = first_ + box.row * across_ + box.column * along_;
+        const i32* const high = low + box.high * across_;
+        const i64 wide = box.wide * along_;
+        return sign_ * (i64{high[wide]} - low[wide] - *high + *low);
+    }
+
+private:
+    const i32* first_ = nullptr;  // that of the corner at which the turned window begins
+    i64 across_ = 0, along_ = 0;  // elements from one row or column of the turned window to the next
+    i64 sign_;
+};
+
+// corner_sums of the cells of a mask that aren't occupied; only those in a part of it are counted and set.
+Array<i32, 2> empty_sums(View<const bool, 2> mask, View<const bool, 2> occupied, const CellBox& part) {
     const auto [rows, columns] = mask.shape;
     auto result = Array<i32, 2>::empty({rows + 1, columns + 1});
     const View<i32, 2> sums = result;
-    std::ranges::fill(sums[0], 0);
-    for (i64 row = 0; row < rows; ++row) {
+    const i64 first = part.column, last = part.column + part.wide;
+    std::ranges::fill(sums[part.row].slice(first, last + 1), 0);
+    for (i64 row = part.row; row < part.row + part.high; ++row) {
+        const View<const bool> cells = mask[row], taken = occupied[row];
+        const View<const i32> below = sums[row];
+        const View<i32> above = sums[row + 1];
         i32 in_row = 0;
-        sums(row + 1, 0) = 0;
-        for (i64 column = 0; column < columns; ++column) {
-            in_row += mask(row, column) && !occupied(row, column) ? 1 : 0;
-            sums(row + 1, column + 1) = sums(row, column + 1) + in_row;
+        above[first] = 0;
+        for (i64 column = first; column < last; ++column) {
+            in_row += static_cast<i32>(cells[column]) & static_cast<i32>(!taken[column]);
+            above[column + 1] = below[column + 1] + in_row;
         }
     }
     return result;
@@ -76,63 +102,56 @@ public:
         : floor_(floor),
           group_(group),
           shape_(floor.holds.shape),
-          holds_(empty_sums(floor.holds, occupied)),
-          whole_(group.front > 0 ? empty_sums(floor.whole, occupied) : Array<i32, 2>{}),
-          extent_(extent_of(floor.holds)) {}
+          extent_(extent_of(floor.holds)),
+          holds_(empty_sums(floor.holds, occupied, extent_)),
+          whole_(group.front > 0 ? empty_sums(floor.whole, occupied, {0, 0, shape_[0], shape_[1]}) : Array<i32, 2>{}) {}
 
     // Append the places in the window turned by `turn`; returns the new number of places.
     i64 append_places(int turn, Array<i64, 2>& places, i64 count) const {
         const i64 rows = turn % 2 == 0 ? shape_[0] : shape_[1], columns = turn % 2 == 0 ? shape_[1] : shape_[0];
         const CellBox extent = unturned(extent_, (TURNS - turn) % TURNS, {rows, columns});  // turned, in fact
-        const i64 last_row = std::min(extent.row + extent.high, rows - group_.front) - group_.depth;
-        const i64 last_column = extent.column + extent.wide - group_.width;
+        const i64 width = group_.width, depth = group_.depth, front = group_.front;
+        const i64 last_row = std::min(extent.row + extent.high, rows - front) - depth;
+        const i64 last_column = extent.column + extent.wide - width;
+        const TurnedSums holds(holds_, turn), whole(front > 0 ? whole_ : holds_, turn), behind(before_wall(turn), turn),
+            right(before_wall(turn + TURNS - 1), turn), left(before_wall(turn + 1), turn);
         for (i64 row = extent.row; row <= last_row; ++row) {
             for (i64 column = extent.column; column <= last_column; ++column) {
-                if (!is_possible(turn, row, column)) continue;
+                // Most places of a group that needs a wall have none behind them.
+                if (behind.count({row, column, 1, width}) < group_.backed) continue;
+                if (holds.count({row, column, depth, width}) < depth * width) continue;
+                if (front > 0 && whole.count({row + depth, column, front, width}) < front * width) continue;
                 places.grow(count + 1, count);
                 const View<i64> place = places.view()[count++];
-                place[0] = turn, place[1] = row, place[2] = column, place[3] = points_at(turn, row, column);
+                const i64 beside =
+                    std::max(left.count({row, column + width - 1, depth, 1}), right.count({row, column, depth, 1}));
+                place[0] = turn, place[1] = row, place[2] = column;
+                place[3] = group_.corner * beside / depth + points_away(turn, row, column);
             }
         }
         return count;
     }
 
 private:
-    bool is_possible(int turn, i64 row, i64 column) const {
-        const auto is_full = [&](View<const i32, 2> sums, const CellBox& box) {
-            return count_in(sums, unturned(box, turn, shape_)) == box.high * box.wide;
-        };
-        // Most places of a group that needs a wall have none behind them.
-        return before_wall(turn, turn, {row, column, 1, group_.width}) >= group_.backed &&
-               is_full(holds_.view(), {row, column, group_.depth, group_.width}) &&
-               (group_.front == 0 || is_full(whole_.view(), {row + group_.depth, column, group_.front, group_.width}));
-    }
+    View<const i32, 2> before_wall(int side) const { return floor_.before_walls[side % TURNS]; }
 
-    i64 points_at(int turn, i64 row, i64 column) const {
-        const i64 width = group_.width, depth = group_.depth, most = group_.far * group_.far;
-        const i64 right = before_wall(turn + TURNS - 1, turn, {row, column, depth, 1});
-        const i64 left = before_wall(turn + 1, turn, {row, column + width - 1, depth, 1});
-        const CellBox middle = unturned({row + depth / 2, column + width / 2, 1, 1}, turn, shape_);
-        const i64 distance = std::clamp(floor_.from_doors(middle.row, middle.column), i64{0}, most);
-        return group_.corner * std::max(left, right) / depth + distance * group_.away / most;
-    }
-
-    // The number of cells of a box of the turned window that are before the wall on a side of it.
-    i64 before_wall(int side, int turn, const CellBox& box) const {
-        return count_in(floor_.before_walls[side % TURNS], unturned(box, turn, shape_));
+    i64 points_away(int turn, i64 row, i64 column) const {
+        const i64 most = group_.far * group_.far;
+        const CellBox middle = unturned({row + group_.depth / 2, column + group_.width / 2, 1, 1}, turn, shape_);
+        return std::clamp(floor_.from_doors(middle.row, middle.column), i64{0}, most) * group_.away / most;
     }
 
     const RoomFloor& floor_;
     const GroupRule& group_;
     std::array<i64, 2> shape_;
-    Array<i32, 2> holds_, whole_;  // corner_sums of the cells that aren't occupied
     CellBox extent_;               // the cells that furniture may cover
+    Array<i32, 2> holds_, whole_;  // corner_sums of the cells that aren't occupied
 };
 
 }  // namespace
 
 Array<i32, 2> corner_sums(View<const bool, 2> mask) {
-    return empty_sums(mask, Array<bool, 2>::zeros(mask.shape).view());
+    return empty_sums(mask, Array<bool, 2>::zeros(mask.shape).view(), {0, 0, mask.shape[0], mask.shape[1]});
 }
 
 Array<i64, 2> group_places(const RoomFloor& floor, View<const bool, 2> occupied, const GroupRule& group) {

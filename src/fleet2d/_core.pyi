@@ -623,6 +623,36 @@ def move_walls(ring: numpy.typing.NDArray[numpy.int64], reach: int, half: int) -
         hides would vanish.
     """
 
+def wall_obstacles(corners: numpy.typing.NDArray[numpy.int64], ring_of: numpy.typing.NDArray[numpy.int64], reach: int, half: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    Return the obstacles that walls are to a body, for `add_obstacles`.
+
+    Args:
+        corners: Those of closed rings, the first of each once more at its end, int64 (n, 2) [lattice units].
+        ring_of: The ring of each corner, int64 (n,).
+        reach: Distance of the straight sides of the body's octagon from its middle [lattice units].
+        half: Half the length of these sides [lattice units].
+
+    Returns:
+        int64 (walls, 10): least and greatest x, y, x + y and x - y of each, a number that it shares
+        with those that it touches, also through others, and whether it is slanted.
+    """
+
+def add_obstacles(obstacles: numpy.typing.NDArray[numpy.int64], boxes: numpy.typing.NDArray[numpy.int64], reach: int, half: int) -> tuple[numpy.typing.NDArray[numpy.int64], int]:
+    """
+    Add rectangles to obstacles, and count how often they may cut a body's space in two.
+
+    Args:
+        obstacles: From `wall_obstacles` or this, int64 (n, 10).
+        boxes: Least x and y, and greatest, of further ones, int64 (m, 4) [lattice units].
+        reach: As of `wall_obstacles`.
+        half: As of `wall_obstacles`.
+
+    Returns:
+        All obstacles, int64 (n + m, 10), and the count: 0 if each part of the space that isn't covered
+        whole certainly stays in one piece.
+    """
+
 def leg_cost(cost: numpy.typing.NDArray[numpy.int32], ax: int, ay: int, bx: int, by: int) -> float:
     """
     Return the cost of a straight leg [percent times lattice units]; infinite if it is blocked.

@@ -11,28 +11,26 @@ from shapely import MultiPolygon, Polygon
 from tests.strategies import quick
 
 from fleet2d.floorplan.body_spaces import (
-    CUT_OFF_M2,
     RADII,
     THIN_RADIUS,
     BodySpace,
+    cuts_nothing,
     exact_space,
     large_parts,
+    obstacles_among,
     solid_footprints,
-    stays_whole,
 )
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.home import lattice_footprint
-from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.mesh import GRID
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.space import BODY_RADIUS, grow_boxes, grow_polygons, shrink
+from fleet2d.floorplan.space import BODY_RADIUS, grow_boxes, grow_polygons
 from fleet2d.kernels import I64
 
 box_of_floor = st.tuples(
     st.integers(0, 40), st.integers(0, 30), st.integers(2, 20), st.integers(2, 20)
 )
 Box = tuple[int, int, int, int]
-MARGIN_CELLS = 12
 
 
 def one_room(kind: str) -> FloorPlan:
@@ -51,6 +49,10 @@ def two_rooms() -> FloorPlan:
 def footprint(x: int, y: int, width: int, depth: int) -> Polygon:
     """Return a rectangle [m] by its corner and size [0.1 m]."""
     return shapely.box(x / 10, y / 10, (x + width) / 10, (y + depth) / 10)
+
+
+def boxes_of(footprints: list[Polygon]) -> I64:
+    return shapely.bounds(footprints).astype(np.int64).reshape(-1, 4)
 
 
 def without(plan: FloorPlan, parts: list[Polygon], shape: Polygon, kept: I64) -> list[Polygon]:
@@ -72,17 +74,14 @@ def test_furniture_is_refused_where_it_cuts_the_whole_space(
 ) -> None:
     plan = two_rooms()
     expected = exact_space(plan, [], radius)
-    space = BodySpace(plan, radius, expected)
+    space = BodySpace(plan, radius, obstacles_among(plan, [], radius), expected)
     kept = plan.lattice.to_lattice([(1.2, 2.0), (4.0, 3.5)])
     for box in boxes:
         corners = plan.lattice.to_walls(np.reshape(footprint(*box).bounds, (2, 2)))
-        (x0, y0), (x1, y1) = (corners // UNITS_PER_CELL).tolist()
-        rows = slice(y0 - MARGIN_CELLS, y1 + MARGIN_CELLS)
-        columns = slice(x0 - MARGIN_CELLS, x1 + MARGIN_CELLS)
         (grown,) = grow_boxes(corners.reshape(1, 4), radius * plan.lattice.units_per_m + GRID)
         left = without(plan, expected, grown, kept)
 
-        rest = space.without(corners.reshape(1, 4), (rows, columns), kept)
+        rest = space.without(corners.reshape(1, 4), kept)
 
         assert (rest is None) == (not left)
         expected = left or expected
@@ -106,29 +105,30 @@ def test_boxes_grow_as_polygons_do(radius: float) -> None:
 
 
 @quick
-@given(st.lists(box_of_floor, max_size=6))
-def test_home_is_whole_only_if_no_body_has_a_second_large_space(
-    boxes: list[Box],
+@given(st.lists(box_of_floor, max_size=6), st.sampled_from(RADII))
+def test_furniture_that_cuts_nothing_leaves_every_part_of_a_space_whole(
+    boxes: list[Box], radius: float
 ) -> None:
-    plan = one_room("bedroom")
-    unit = plan.lattice.units_per_m
+    plan = two_rooms()
     bed = stand_furniture("bed", (2.0, 2.0))
     things = [replace(bed, footprint=footprint(*box)) for box in boxes]
     solid = solid_footprints(plan, things)
 
-    if stays_whole(plan, solid):
-        for radius in RADII:
-            blocked = grow_polygons(solid, radius * unit)
-            spaces = shrink(plan.polygons, radius * unit, blocked)
-            assert 1 >= sum(space.area > CUT_OFF_M2 * unit**2 for space in spaces)
+    if cuts_nothing(plan, [], boxes_of(solid), radius):
+        parts = exact_space(plan, solid, radius)
+        inside = shapely.point_on_surface(parts)
+        for before in exact_space(plan, [], radius):
+            assert 1 >= shapely.contains(before, inside).sum()
 
 
-def test_home_is_whole_unless_furniture_divides_it_or_a_wall_is_slanted() -> None:
+def test_furniture_that_divides_a_room_cuts_it_at_every_radius() -> None:
     plan = one_room("bedroom")
     bed = replace(stand_furniture("bed", (2, 2)), footprint=shapely.box(2, 0, 2.5, 4))
     across = lattice_footprint(plan, bed)
-    slanted = FloorPlan.build("tent", shapely.Polygon([(0, 0), (5, 0), (5, 4)]))
+    beside = boxes_of([lattice_footprint(plan, stand_furniture("bed", (1, 1), size=(2, 2)))])
 
-    assert stays_whole(plan, [])
-    assert not stays_whole(plan, [across])
-    assert not stays_whole(slanted, [])
+    for radius in RADII:
+        assert cuts_nothing(plan, [], boxes_of([]), radius)
+        assert cuts_nothing(plan, [], beside, radius)
+        assert not cuts_nothing(plan, [], boxes_of([across]), radius)
+        assert cuts_nothing(plan, [across], boxes_of([across]), radius)

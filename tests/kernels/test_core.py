@@ -518,6 +518,18 @@ CALLS: dict[str, Args] = {
         np.array([[0, 0, 0, 20]]),
     ),
     "move_walls": lambda: (np.array([[0, 0], [90, 0], [90, 60], [0, 60]]), 9, 4),
+    "wall_obstacles": lambda: (
+        np.array([[0, 0], [90, 0], [90, 60], [0, 0]]),
+        np.zeros(4, np.int64),
+        9,
+        4,
+    ),
+    "add_obstacles": lambda: (
+        _core.wall_obstacles(np.array([[0, 0], [90, 0]]), np.zeros(2, np.int64), 9, 4),
+        np.array([[10, 0, 50, 30]]),
+        9,
+        4,
+    ),
     "is_promising": lambda: (np.array([[0, 0, 0, 60, 50]]), LIMITS.copy()),
     "strip_rooms": lambda: (SLOTS.copy(), AREAS.copy(), 100, 20, 240),
     "row_rooms": lambda: (SLOTS.copy(), AREAS.copy(), CorridorRule(2, 24, 0, -1), 100, 20, 240),

@@ -20,6 +20,7 @@ NB_MODULE(_core, m) {
     bind_furniture(m);
     bind_layouts(m);
     bind_moved_walls(m);
+    bind_obstacles(m);
     bind_taut(m);
     bind_region(m);
     bind_visible_cells(m);

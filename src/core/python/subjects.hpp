@@ -16,6 +16,7 @@ void bind_fields(nanobind::module_& m);
 void bind_furniture(nanobind::module_& m);
 void bind_layouts(nanobind::module_& m);
 void bind_moved_walls(nanobind::module_& m);
+void bind_obstacles(nanobind::module_& m);
 void bind_taut(nanobind::module_& m);
 void bind_giving_way(nanobind::module_& m);
 void bind_timelines(nanobind::module_& m);

@@ -1,7 +1,6 @@
 """The spaces of bodies in a home, and whether furniture that is put into it cuts them in two."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -9,12 +8,11 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.floorplan.home import lattice_footprint
-from fleet2d.floorplan.lattice import UNITS_PER_CELL
 from fleet2d.floorplan.mesh import GRID
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.space import BODY_RADIUS, Window, grow_boxes, grow_polygons, shrink
-from fleet2d.kernels import I64
+from fleet2d.floorplan.space import BODY_RADIUS, body_octagon, grow_boxes, grow_polygons, shrink
+from fleet2d.kernels import I64, add_obstacles, wall_obstacles
 
 THIN_RADIUS = 0.1
 """The radius of the thinnest body whose routes furniture leaves open [m]."""
@@ -25,17 +23,12 @@ RADII = (BODY_RADIUS, *NARROW_RADII, THIN_RADIUS)
 CUT_OFF_M2 = 0.25
 """Furniture may cut off less than this of a body's space, such as a corner behind a bed [m²]."""
 
-# By how much more than its radius a body's space is shrunk so that rounding can't make it smaller
-# [lattice], and the part of `CUT_OFF_M2` that is less than it in any case.
-ROUNDED = 8
-CERTAIN = 0.75
-
 
 class BodySpace:
     """The space of a body while a home is furnished room by room; it never changes.
 
-    Most furniture cuts nothing, which the surroundings of its room show. So shapes are taken out of
-    the whole space only when that is needed: then all at once.
+    Most furniture cuts nothing, which shows in what it touches. So pieces are taken out of the
+    space only when that is needed: then all at once.
 
     Attributes:
         radius: The body's radius [m].
@@ -45,54 +38,49 @@ class BodySpace:
         self,
         plan: FloorPlan,
         radius: float,
+        obstacles: I64,
         parts: Sequence[Polygon],
-        removed: tuple[BaseGeometry, ...] = (),
-        near: "_NearSpace | None" = None,
+        removed: tuple[I64, ...] = (),
     ) -> None:
         """Remember a space.
 
         Args:
             plan: The plan.
             radius: The body's radius [m].
+            obstacles: What bars its ways, see `obstacles_among`.
             parts: Its outlines [lattice].
-            removed: Shapes that are not in it, none of which cuts a part in two [lattice].
-            near: The part of it around the room that was last furnished, if known.
+            removed: Pieces of furniture to be taken out of these, none of which cuts a part in two.
         """
         self.radius = radius
         self._plan = plan
+        self._obstacles = obstacles
         self._parts = list(parts)
         self._removed = removed
-        self._near = near
+        # Further by the rounding of a space, so that what is connected here is connected there.
+        self._reach = radius * plan.lattice.units_per_m + GRID
 
     @property
     def parts(self) -> list[Polygon]:
         """Its outlines [lattice]."""
         if self._removed:
-            self._parts = _largest_pieces(self._parts, shapely.union_all(self._removed))
+            grown = grow_boxes(np.concatenate(self._removed), self._reach)
+            self._parts = _largest_pieces(self._parts, shapely.union_all(grown))
             self._removed = ()
         return self._parts
 
-    def without(self, boxes: I64, window: Window, kept: I64) -> "BodySpace | None":
+    def without(self, boxes: I64, kept: I64) -> "BodySpace | None":
         """Return the space among further pieces of furniture, or None if these cut a part in two.
 
         Args:
             boxes: The pieces, int64 (n, 4): least and greatest x and y [lattice].
-            window: Rows and columns around the room that they are in.
             kept: Points that the space must not lose, int64 (n, 2) [lattice].
         """
-        # Further by the rounding of a space, so that what is connected here is connected there.
-        reach = self.radius * self._plan.lattice.units_per_m + GRID
-        grown = grow_boxes(boxes, reach)
-        blocked = grown[0] if len(grown) == 1 else shapely.union_all(grown)
+        obstacles, cuts = add_obstacles(self._obstacles, boxes, *_octagon_sides(self._reach))
         x, y = kept.T
-        if self._near is None or self._near.window != window:
-            self._near = self._clipped(window)
-        pieces = [_pieces(polygon, blocked) for polygon in self._near.polygons]
-        leads_round = all(len(polygons) == 1 for polygons in pieces)
-        if leads_round and not shapely.intersects_xy(blocked, x, y).any():
-            near = _NearSpace(window, [polygon for (polygon,) in pieces])
-            removed = (*self._removed, blocked)
-            return BodySpace(self._plan, self.radius, self._parts, removed, near)
+        if not cuts and not self._loses(boxes, x, y):
+            removed = (*self._removed, boxes)
+            return BodySpace(self._plan, self.radius, obstacles, self._parts, removed)
+        blocked = shapely.union_all(grow_boxes(boxes, self._reach))
         for part in self.parts:
             if len(large_parts(self._plan, _pieces(part, blocked))) > 1:
                 return None
@@ -100,32 +88,16 @@ class BodySpace:
         before, after = (
             shapely.contains_xy(MultiPolygon(parts), x, y) for parts in (self.parts, left)
         )
-        return None if (before & ~after).any() else BodySpace(self._plan, self.radius, left)
+        if (before & ~after).any():
+            return None
+        return BodySpace(self._plan, self.radius, obstacles, left)
 
-    def _clipped(self, window: Window) -> "_NearSpace":
-        """Return the part of the space within some rows and columns."""
-        rows, columns = window
-        ends = (columns.start, rows.start, columns.stop, rows.stop)
-        frame = [end * UNITS_PER_CELL for end in ends]
-        inside = shapely.clip_by_rect(self._parts, *frame)
-        removed = np.array(self._removed, np.object_)
-        removed = removed[shapely.intersects(removed, shapely.box(*frame))]
-        if len(removed):
-            inside = shapely.difference(inside, shapely.union_all(removed))
-        parts = shapely.get_parts(inside).tolist()
-        return _NearSpace(window, [part for part in parts if part.geom_type == "Polygon"])
-
-
-class _NearSpace(NamedTuple):
-    """The part of a space around a room.
-
-    Attributes:
-        window: Rows and columns.
-        polygons: The outlines of the space within them [lattice].
-    """
-
-    window: Window
-    polygons: list[Polygon]
+    def _loses(self, boxes: I64, x: I64, y: I64) -> bool:
+        """Return whether a body at one of some points would touch a piece of furniture."""
+        if not len(x):
+            return False
+        grown = grow_boxes(boxes, self._reach)
+        return bool(shapely.intersects_xy(grown[:, None], x, y).any())
 
 
 def _largest_pieces(parts: Sequence[Polygon], without: BaseGeometry) -> list[Polygon]:
@@ -148,7 +120,10 @@ def body_spaces(plan: FloorPlan, widest: list[Polygon]) -> list[BodySpace]:
     parts = {BODY_RADIUS: widest, THIN_RADIUS: thin}
     if _has_narrow_places(plan, widest, thin):
         parts |= {radius: exact_space(plan, solid, radius) for radius in NARROW_RADII}
-    return [BodySpace(plan, radius, outlines) for radius, outlines in parts.items()]
+    return [
+        BodySpace(plan, radius, obstacles_among(plan, solid, radius), outlines)
+        for radius, outlines in parts.items()
+    ]
 
 
 def solid_footprints(plan: FloorPlan, things: Iterable[PlacedObject]) -> list[Polygon]:
@@ -162,33 +137,32 @@ def exact_space(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> lis
     return shrink(plan.polygons, reach, grow_polygons(solid, reach))
 
 
-def stays_whole(plan: FloorPlan, solid: Sequence[Polygon]) -> bool:
-    """Return whether no body has a space besides its largest one that furniture may not cut off.
-
-    A fast check of homes whose walls and furniture are parallel to the axes: there a mitred buffer
-    whose corners are cut is the space of an octagonal body, but for rounding. It is taken a little
-    wider than that, so a passage counts only if it certainly is one.
+def cuts_nothing(plan: FloorPlan, solid: Sequence[Polygon], boxes: I64, radius: float) -> bool:
+    """Return whether further furniture certainly cuts no part of a body's space in two.
 
     Args:
-        plan: The home.
-        solid: The footprints of the objects that bodies can't pass [lattice].
-
-    Returns:
-        False also where this can't tell.
+        plan: The plan.
+        solid: The footprints in it [lattice].
+        boxes: Further ones, int64 (n, 4): least and greatest x and y [lattice].
+        radius: The body's radius [m].
     """
-    free = shapely.difference(MultiPolygon(plan.polygons), shapely.union_all(solid))
-    rings = shapely.get_rings(shapely.get_parts(free))
+    sides = _octagon_sides(radius * plan.lattice.units_per_m)
+    _, cuts = add_obstacles(obstacles_among(plan, solid, radius), boxes, *sides)
+    return not cuts
+
+
+def obstacles_among(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> I64:
+    """Return what bars the ways of a body among walls and footprints, for `add_obstacles`."""
+    rings = shapely.get_rings([*plan.polygons, *solid])
     corners, ring_of = shapely.get_coordinates(rings, return_index=True)
-    is_slanted = (corners[1:] != corners[:-1]).all(axis=1)
-    if (is_slanted & (ring_of[1:] == ring_of[:-1])).any():
-        return False
-    unit = plan.lattice.units_per_m
-    for radius in RADII:
-        space = free.buffer(-radius * unit - ROUNDED, join_style="mitre", mitre_limit=1.0)
-        areas = shapely.area(shapely.get_parts(space))
-        if not len(areas) or areas.sum() - areas.max() > CERTAIN * CUT_OFF_M2 * unit**2:
-            return False
-    return True
+    sides = _octagon_sides(radius * plan.lattice.units_per_m)
+    return wall_obstacles(corners.astype(np.int64), ring_of, *sides)
+
+
+def _octagon_sides(reach: float) -> list[int]:
+    """Return how far an octagon's straight sides are from its middle, and half their length."""
+    sides: list[int] = body_octagon(reach)[0].tolist()
+    return sides
 
 
 def _has_narrow_places(plan: FloorPlan, widest: list[Polygon], thinnest: list[Polygon]) -> bool:

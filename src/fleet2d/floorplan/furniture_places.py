@@ -15,10 +15,10 @@ from fleet2d.floorplan.body_spaces import (
     RADII,
     BodySpace,
     body_spaces,
+    cuts_nothing,
     exact_space,
     large_parts,
     solid_footprints,
-    stays_whole,
 )
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
@@ -338,21 +338,21 @@ class Interior:
         pieces of floor may in fact be connected, and too large to be cut off together.
         """
         plan = self.plan
-        fixed = len(plan.objects)
-        groups = [plan.objects, *self.groups]
-        solid = [solid_footprints(plan, group) for group in groups]
+        fixed = solid_footprints(plan, plan.objects)
+        solid = [solid_footprints(plan, group) for group in self.groups]
 
         @cache
         def before(radius: float) -> list[Polygon]:
             known = (space.parts for space in self._empty if space.radius == radius)
-            return next(known, None) or exact_space(plan, solid[0], radius)
+            return next(known, None) or exact_space(plan, fixed, radius)
 
         def is_open(count: int) -> bool:
-            standing = list(chain.from_iterable(solid[: count + 1]))
-            if stays_whole(plan, standing):
-                return True
+            added = list(chain.from_iterable(solid[:count]))
+            boxes = shapely.bounds(added).astype(np.int64).reshape(-1, 4)
             for radius in RADII:
-                large = large_parts(plan, exact_space(plan, standing, radius))
+                if cuts_nothing(plan, fixed, boxes, radius):
+                    continue
+                large = large_parts(plan, exact_space(plan, [*fixed, *added], radius))
                 if len(large) > 1:
                     inside = shapely.point_on_surface(large)
                     if any(shapely.contains(part, inside).sum() > 1 for part in before(radius)):
@@ -362,8 +362,8 @@ class Interior:
         while not is_open(len(self.groups)):
             # The more furniture, the less is connected: find the first group too many.
             first = bisect_left(range(1, len(self.groups) + 1), True, key=lambda n: not is_open(n))
-            del self.groups[first], solid[first + 1]
-        self.objects = [*self.objects[:fixed], *chain.from_iterable(self.groups)]
+            del self.groups[first], solid[first]
+        self.objects = [*self.objects[: len(plan.objects)], *chain.from_iterable(self.groups)]
 
     def _add(self, view: RoomView, things: list[PlacedObject]) -> bool:
         """Add objects if they stand in free space, are usable and cut no route; return whether."""
@@ -375,7 +375,7 @@ class Interior:
         if self._ways_stay_open(view, before, grown):
             usable = self._usable(view, things)
         if usable is not None:
-            spaces = self._spaces_with(view, usable)
+            spaces = self._spaces_with(usable)
         if usable is None or spaces is None:
             self.standing[view.window] = before
             return False
@@ -421,7 +421,7 @@ class Interior:
             usable.append(reachable)
         return usable
 
-    def _spaces_with(self, view: RoomView, things: list[PlacedObject]) -> list[BodySpace] | None:
+    def _spaces_with(self, things: list[PlacedObject]) -> list[BodySpace] | None:
         """Return the spaces of bodies among further objects, or None if these cut a space in two.
 
         Cells alone can't tell: between slanted walls, or for a thin body, there may be a way where
@@ -438,7 +438,7 @@ class Interior:
         spaces = []
         for space in self._spaces:
             must_keep = kept if space.radius == BODY_RADIUS else kept[:0]
-            rest = space.without(boxes, view.window, must_keep)
+            rest = space.without(boxes, must_keep)
             if rest is None:
                 return None
             spaces.append(rest)

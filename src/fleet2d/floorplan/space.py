@@ -467,7 +467,7 @@ def shrink(
         radius: The radius of the body [lattice].
         blocked: Shapes that are removed from the result.
     """
-    octagon = _octagon(radius)
+    octagon = body_octagon(radius)
     shrunk: list[Polygon] = []
     for polygon in polygons:
         moved = _with_walls_moved(polygon, octagon)
@@ -509,7 +509,7 @@ def _with_walls_moved(polygon: Polygon, octagon: I64) -> Polygon | None:
 
 
 @lru_cache(64)
-def _octagon(radius: float) -> I64:
+def body_octagon(radius: float) -> I64:
     """Return the corners of the octagon that approximates a body."""
     a = 2 * math.ceil((radius + ROUNDING) / 2)
     # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
@@ -526,13 +526,13 @@ def grow_shape(corners: F64, radius: float) -> BaseGeometry:
         radius: The radius of the body [lattice].
     """
     if len(corners) < 4:
-        return shapely.union_all(_grow_walls(corners, _octagon(radius)))
+        return shapely.union_all(_grow_walls(corners, body_octagon(radius)))
     return grow_polygons([Polygon(corners)], radius)[0]
 
 
 def grow_polygons(polygons: Sequence[Polygon], radius: float) -> list[BaseGeometry]:
     """Grow polygons without holes [lattice] by the octagon of a body; see `grow_shape`."""
-    octagon = _octagon(radius)
+    octagon = body_octagon(radius)
     solid = np.array(polygons, np.object_)
     grown = np.empty(len(solid), np.object_)
     is_round = shapely.area(solid) >= shapely.area(shapely.convex_hull(solid)) * (1 - CONVEX_SLACK)
@@ -553,7 +553,7 @@ def grow_boxes(boxes: I64, radius: float) -> NDArray[np.object_]:
         boxes: Least x and y, and greatest, int64 (n, 4) [lattice].
         radius: The radius of the body [lattice].
     """
-    return np.asarray(shapely.polygons(boxes[:, _BOX_CORNERS] + _octagon(radius)))
+    return np.asarray(shapely.polygons(boxes[:, _BOX_CORNERS] + body_octagon(radius)))
 
 
 # Which x and which y of a box is the middle of each corner of an octagon's way round it.

@@ -1,0 +1,109 @@
+"""Where furniture cuts the space of a body: the kernels beside their slow twins."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely.geometry import Polygon
+from tests.reference import obstacles as slow
+from tests.strategies import homes, quick
+
+from fleet2d.kernels import I64, add_obstacles, wall_obstacles
+
+coordinate = st.integers(0, 24).map(lambda n: 32 * n)
+box = st.tuples(coordinate, coordinate, coordinate, coordinate).map(
+    lambda b: (min(b[0], b[2]), min(b[1], b[3]), max(b[0], b[2]), max(b[1], b[3]))
+)
+octagons = st.sampled_from([(2, 2), (16, 6), (64, 26), (100, 0)])
+
+
+def rings_of(polygons: list[Polygon]) -> tuple[I64, I64]:
+    corners, ring_of = shapely.get_coordinates(shapely.get_rings(polygons), return_index=True)
+    return corners.astype(np.int64), ring_of.astype(np.int64)
+
+
+def corners_of(box: tuple[int, int, int, int]) -> list[tuple[int, int]]:
+    x0, y0, x1, y1 = box
+    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+
+
+@quick
+@given(homes(), octagons, st.lists(box, max_size=4))
+def test_obstacles_and_cuts_equal_the_slow_ones(
+    polygons: list[Polygon], octagon: tuple[int, int], boxes: list[tuple[int, int, int, int]]
+) -> None:
+    corners, ring_of = rings_of(polygons)
+    walls = slow.walls_of(corners, ring_of)
+    extents = [slow.grown(wall, *octagon) for wall in walls]
+    slanted = [slow.is_slanted(wall) for wall in walls]
+
+    table = wall_obstacles(corners, ring_of, *octagon)
+    assert slow.table_of(extents, slanted) == slow.table_read(table)
+
+    expected = 0
+    for each in boxes:
+        shapes = [slow.shape_of(known) for known in extents]
+        extents.append(slow.grown(corners_of(each), *octagon))
+        expected += slow.cuts_by(shapes, slanted, slow.shape_of(extents[-1]))
+        slanted.append(False)
+    further = np.array(boxes, np.int64).reshape(-1, 4)
+    table, cuts = add_obstacles(table, further, *octagon)
+    assert expected == cuts
+    assert slow.table_of(extents, slanted) == slow.table_read(table)
+
+
+@quick
+@given(st.lists(box, min_size=1, max_size=8), octagons)
+def test_no_cut_leaves_as_many_pieces_or_fewer(
+    boxes: list[tuple[int, int, int, int]], octagon: tuple[int, int]
+) -> None:
+    room = shapely.box(-64, -64, 900, 900)
+    table = wall_obstacles(*rings_of([room]), *octagon)
+    walls = [slow.shape_of(row) for row in table[:, :8].tolist()]
+    space = shapely.difference(room, shapely.union_all(walls))
+    for each in boxes:
+        table, cuts = add_obstacles(table, np.array([each]), *octagon)
+        shape = slow.shape_of(slow.grown(corners_of(each), *octagon))
+        pieces, left = (
+            sum(part.area > 0 for part in shapely.get_parts(polygons))
+            for polygons in (space, shapely.difference(space, shape))
+        )
+        assert cuts or left <= pieces
+        assert left <= pieces + cuts
+        space = shapely.difference(space, shape)
+
+
+def test_a_board_from_wall_to_wall_cuts_once_and_one_in_a_corner_never() -> None:
+    room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
+
+    assert 1 == add_obstacles(room, np.array([[190, 0, 210, 300]]), 20, 8)[1]
+    assert 1 == add_obstacles(room, np.array([[190, 39, 210, 262]]), 20, 8)[1]
+    assert 0 == add_obstacles(room, np.array([[190, 41, 210, 300]]), 20, 8)[1]
+    assert 0 == add_obstacles(room, np.array([[0, 0, 90, 90], [150, 150, 170, 170]]), 20, 8)[1]
+    assert 0 == add_obstacles(room, np.zeros((0, 4), np.int64), 20, 8)[1]
+
+
+def test_two_boxes_that_touch_each_other_and_two_walls_cut_once() -> None:
+    room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
+
+    table, cuts = add_obstacles(room, np.array([[190, 0, 210, 140]]), 20, 8)
+    assert 0 == cuts
+    assert 1 == add_obstacles(table, np.array([[190, 150, 210, 300]]), 20, 8)[1]
+    assert 0 == add_obstacles(table, np.array([[190, 190, 210, 300]]), 20, 8)[1]
+
+
+def test_a_box_between_a_slanted_wall_and_another_may_cut() -> None:
+    """Their octagons don't meet at the slanted wall itself, but may where it is at most."""
+    tent = wall_obstacles(*rings_of([Polygon([(0, 0), (400, 0), (400, 300)])]), 20, 8)
+
+    assert 1 == add_obstacles(tent, np.array([[110, 0, 130, 20]]), 20, 8)[1]
+    assert 0 == add_obstacles(tent, np.array([[340, 0, 400, 20]]), 20, 8)[1]
+
+
+def test_sizes_that_fit_nothing_are_refused() -> None:
+    room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
+    with pytest.raises(ValueError, match="half must be"):
+        add_obstacles(room, np.zeros((0, 4), np.int64), 4, 5)
+    with pytest.raises(ValueError, match="numbers must be"):
+        add_obstacles(np.where(np.arange(10) == 8, -1, room), np.zeros((0, 4), np.int64), 4, 4)
