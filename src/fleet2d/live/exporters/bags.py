@@ -13,7 +13,8 @@ import numpy as np
 from fleet2d.errors import RunDirectoryError
 from fleet2d.kernels import I64, U8
 from fleet2d.live.exporters import Records, Selection, new_file
-from fleet2d.live.exporters.ros import Block, RosMessages, Topic
+from fleet2d.live.exporters.ros import Block, RosMessages
+from fleet2d.live.ros.topics import RosTopic
 from fleet2d.runs.run import Run
 from fleet2d.storage.bags import LOG_TYPE, METADATA
 from fleet2d.storage.files import new_folder
@@ -91,7 +92,7 @@ class McapWriter:
         chunks: What has been written so far.
     """
 
-    def __init__(self, file: BinaryIO, topics: Sequence[tuple[Topic, str]]) -> None:
+    def __init__(self, file: BinaryIO, topics: Sequence[tuple[RosTopic, str]]) -> None:
         """Begin a file with topics and the definitions of their messages."""
         self._file = file
         self._at = 0
@@ -295,9 +296,9 @@ def foxglove_layout(messages: RosMessages) -> dict[str, object]:
     }
 
 
-def _metadata(topic: Topic) -> dict[str, str]:
+def _metadata(topic: RosTopic) -> dict[str, str]:
     """Return the quality of service of a topic, as rosbag2 stores it."""
-    if not topic.latched:
+    if not topic.is_latched:
         return {}
     no_limit = {"sec": 0, "nsec": 0}
     latched = {

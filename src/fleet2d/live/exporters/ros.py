@@ -16,6 +16,18 @@ import numpy as np
 
 from fleet2d.kernels import F64, I64, U8
 from fleet2d.live.exporters import Chunk, Records
+from fleet2d.live.ros.topics import (
+    UNKNOWN,
+    RosTopic,
+    detection,
+    occupancy_grid,
+    odometry,
+    pose_at,
+    pose_of,
+    stamp_at,
+    transform,
+)
+from fleet2d.live.ros.types import MessageEncoder
 from fleet2d.runs.robot_log import LogEntry, robot_log
 from fleet2d.runtime.local_time import stamp_us
 from fleet2d.storage.bags import LOG_LEVELS, LOG_TYPE, ros_types
@@ -26,25 +38,7 @@ if TYPE_CHECKING:
 MAP = "/map"
 TRANSFORMS = "/tf"
 STATIC = "/tf_static"
-UNKNOWN = "unknown"
-"""The class of a detected person who wasn't recognized."""
-PERSON_M = 0.4
-"""Width of the box of a detected person, whose true size no robot knows [m]."""
 _LEVELS = 20  # INFO in rcl_interfaces/msg/Log
-
-
-class Topic(NamedTuple):
-    """A topic on which a run is published.
-
-    Attributes:
-        name: Its name, such as `/astro/odom`.
-        type: The type of its messages, such as `nav_msgs/msg/Odometry`.
-        latched: Whether its last message is also delivered to later subscribers.
-    """
-
-    name: str
-    type: str
-    latched: bool = False
 
 
 class Message(NamedTuple):
@@ -90,6 +84,7 @@ class RosMessages:
             InputError: rosbags isn't installed.
         """
         self.types = ros_types("ROS messages need rosbags")
+        self._encode = MessageEncoder(self.types).encode
         self._records, self._margin = records, margin
         self._templates: dict[tuple[str, ...], Template] = {}
         self._run = records.run
@@ -97,21 +92,21 @@ class RosMessages:
         self._start_ns = stamp_us(clock.start) // 1_000_000 * 1_000_000_000
         self._step_ns = clock.step_us * 1000
         topics = [
-            Topic(MAP, "nav_msgs/msg/OccupancyGrid", latched=True),
-            Topic(TRANSFORMS, "tf2_msgs/msg/TFMessage"),
-            Topic(STATIC, "tf2_msgs/msg/TFMessage", latched=True),
-            *(Topic(f"/{robot}/odom", "nav_msgs/msg/Odometry") for robot in records.robots),
+            RosTopic(MAP, "nav_msgs/msg/OccupancyGrid", is_latched=True),
+            RosTopic(TRANSFORMS, "tf2_msgs/msg/TFMessage"),
+            RosTopic(STATIC, "tf2_msgs/msg/TFMessage", is_latched=True),
+            *(RosTopic(f"/{robot}/odom", "nav_msgs/msg/Odometry") for robot in records.robots),
         ]
         if "observations" in records.tables:
             kind = "vision_msgs/msg/Detection3DArray"
-            topics += [Topic(f"/{robot}/detections", kind) for robot in records.robots]
+            topics += [RosTopic(f"/{robot}/detections", kind) for robot in records.robots]
         if "events" in records.tables:
-            topics += [Topic(f"/{robot}/log", LOG_TYPE) for robot in records.robots]
+            topics += [RosTopic(f"/{robot}/log", LOG_TYPE) for robot in records.robots]
         tables = [name for name in records.tables if name != "observations"]
-        topics += [Topic(f"/{name}", self._encoder(name)[0]) for name in tables]
+        topics += [RosTopic(f"/{name}", self._encoder(name)[0]) for name in tables]
         self.topics = {topic.name: topic for topic in topics}
 
-    def definition(self, topic: Topic) -> str:
+    def definition(self, topic: RosTopic) -> str:
         """Return the definition of a topic's type and of all types in it, as ROS writes it."""
         return str(self.types.generate_msgdef(topic.type, ros_version=2)[0])
 
@@ -165,46 +160,19 @@ class RosMessages:
     def _time(self, step: int) -> int:
         return self._start_ns + int(step) * self._step_ns
 
-    def _new(self, name: str, *values: Any) -> Any:
-        return self.types.types[name](*values)
-
-    def _header(self, time: int, frame: str) -> Any:
-        stamp = self._new("builtin_interfaces/msg/Time", *divmod(time, 1_000_000_000))
-        return self._new("std_msgs/msg/Header", stamp, frame)
-
-    def _data(self, message: Any) -> bytes:
-        return bytes(self.types.serialize_cdr(message, message.__msgtype__))
+    def _header(self, time: int, frame: str) -> dict[str, Any]:
+        return {"stamp": stamp_at(time), "frame_id": frame}
 
     def _map(self, time: int) -> bytes:
-        plan = self._run.plan
-        header = self._header(time, "map")
-        lattice = plan.lattice
-        corner = self._pose(*lattice.origin, 0.0, 1.0)
-        size = lattice.cell, lattice.columns, lattice.rows
-        info = self._new("nav_msgs/msg/MapMetaData", header.stamp, *size, corner)
-        grid = np.where(plan.free, 0, 100).astype(np.int8).ravel()
-        return self._data(self._new("nav_msgs/msg/OccupancyGrid", header, info, grid))
-
-    def _pose(self, x: float, y: float, z: float, w: float) -> Any:
-        """Return the pose at (x, y) whose quaternion has a z and w."""
-        point = self._new("geometry_msgs/msg/Point", x, y, 0.0)
-        return self._new("geometry_msgs/msg/Pose", point, self._turn(z, w))
-
-    def _turn(self, z: float, w: float) -> Any:
-        return self._new("geometry_msgs/msg/Quaternion", 0.0, 0.0, z, w)
-
-    def _transform(self, time: int, frames: tuple[str, str], xyzw: Sequence[float]) -> Any:
-        x, y, z, w = xyzw
-        vector = self._new("geometry_msgs/msg/Vector3", x, y, 0.0)
-        transform = self._new("geometry_msgs/msg/Transform", vector, self._turn(z, w))
-        header = self._header(time, frames[0])
-        return self._new("geometry_msgs/msg/TransformStamped", header, frames[1], transform)
+        grid = occupancy_grid(self._header(time, "map"), self._run.plan)
+        return self._encode("nav_msgs/msg/OccupancyGrid", grid)
 
     def _static_transforms(self, time: int) -> bytes:
         """Odometry in Fleet2D doesn't drift from the map: errors of localization are in beliefs."""
-        frames = [("map", f"{robot}/odom") for robot in self._records.robots]
-        still = [self._transform(time, pair, (0.0, 0.0, 0.0, 1.0)) for pair in frames]
-        return self._data(self._new("tf2_msgs/msg/TFMessage", still))
+        header = self._header(time, "map")
+        still = pose_at(0.0, 0.0, 0.0)
+        frames = [transform(header, f"{robot}/odom", still) for robot in self._records.robots]
+        return self._encode("tf2_msgs/msg/TFMessage", {"transforms": frames})
 
     def _frames(self, name: str) -> tuple[str, str]:
         is_robot = name in self._records.robots
@@ -232,10 +200,12 @@ class RosMessages:
 
     def _transform_template(self, *names: str) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
-            fours = [values[4 * i : 4 * i + 4] for i in range(len(names))]
-            parts = zip(times, names, fours, strict=True)
-            transforms = [self._transform(time, self._frames(n), four) for time, n, four in parts]
-            return self._data(self._new("tf2_msgs/msg/TFMessage", transforms))
+            transforms = []
+            for i, (time, name) in enumerate(zip(times, names, strict=True)):
+                parent, child = self._frames(name)
+                pose = pose_of(*values[4 * i : 4 * i + 4])
+                transforms.append(transform(self._header(time, parent), child, pose))
+            return self._encode("tf2_msgs/msg/TFMessage", {"transforms": transforms})
 
         return Template(message, len(names), 4 * len(names))
 
@@ -263,23 +233,11 @@ class RosMessages:
     def _odometry_template(self, robot: str) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
             x, y, z, w, forward, left, turning = values
-            pose = self._pose(x, y, z, w)
-            exact = np.zeros(36)
-            twist = self._new(
-                "geometry_msgs/msg/Twist",
-                self._new("geometry_msgs/msg/Vector3", forward, left, 0.0),
-                self._new("geometry_msgs/msg/Vector3", 0.0, 0.0, turning),
-            )
             odom, base = self._frames(robot)
-            return self._data(
-                self._new(
-                    "nav_msgs/msg/Odometry",
-                    self._header(times[0], odom),
-                    base,
-                    self._new("geometry_msgs/msg/PoseWithCovariance", pose, exact),
-                    self._new("geometry_msgs/msg/TwistWithCovariance", twist, exact),
-                )
-            )
+            header = self._header(times[0], odom)
+            speeds = (forward, left, turning)
+            fields = odometry(header, base, pose_of(x, y, z, w), speeds)
+            return self._encode("nav_msgs/msg/Odometry", fields)
 
         return Template(message, 1, 7)
 
@@ -312,28 +270,16 @@ class RosMessages:
 
     def _detection_template(self, *users: str) -> "Template":
         def message(times: Sequence[int], values: Sequence[float]) -> bytes:
-            numbers = [values[8 * i : 8 * i + 8] for i in range(len(users))]
-            detections = [
-                self._detection(self._header(time, "map"), user, of_user)
-                for time, user, of_user in zip(times[1:], users, numbers, strict=True)
-            ]
-            header = self._header(times[0], "map")
-            return self._data(self._new("vision_msgs/msg/Detection3DArray", header, detections))
+            detections = []
+            for i, (time, user) in enumerate(zip(times[1:], users, strict=True)):
+                x, y, z, w, *centre = values[8 * i : 8 * i + 8]
+                header = self._header(time, "map")
+                pose = pose_of(x, y, z, w)
+                detections.append(detection(header, user, pose, pose_of(*centre)))
+            fields = {"header": self._header(times[0], "map"), "detections": detections}
+            return self._encode("vision_msgs/msg/Detection3DArray", fields)
 
         return Template(message, len(users) + 1, 8 * len(users))
-
-    def _detection(self, header: Any, user: str, places: Sequence[float]) -> Any:
-        """Return a detection from the numbers of its pose and of its box's centre."""
-        x, y, z, w, *centre = places
-        exact = np.zeros(36)
-        likely = self._new(
-            "vision_msgs/msg/ObjectHypothesisWithPose",
-            self._new("vision_msgs/msg/ObjectHypothesis", user, 1.0),
-            self._new("geometry_msgs/msg/PoseWithCovariance", self._pose(x, y, z, w), exact),
-        )
-        size = self._new("geometry_msgs/msg/Vector3", PERSON_M, PERSON_M, 0.0)
-        box = self._new("vision_msgs/msg/BoundingBox3D", self._pose(*centre), size)
-        return self._new("vision_msgs/msg/Detection3D", header, [likely], box, user)
 
     def _encoder(self, table: str) -> tuple[str, Callable[[dict[str, Any]], bytes]]:
         """Return the type of message for rows of a table, and the function that makes it."""
@@ -361,21 +307,30 @@ class RosMessages:
 
     def _log(self, robot: str, entry: LogEntry) -> bytes:
         """Return a line of a robot's log as a message of Foxglove."""
-        stamp = self._header(self._time(entry.step), "").stamp
-        level = LOG_LEVELS[entry.level]
-        return self._data(self._new(LOG_TYPE, stamp, level, entry.text, robot, entry.source, 0))
+        fields = {
+            "timestamp": stamp_at(self._time(entry.step)),
+            "level": LOG_LEVELS[entry.level],
+            "message": entry.text,
+            "name": robot,
+            "file": entry.source,
+        }
+        return self._encode(LOG_TYPE, fields)
 
     def log_entry(self, row: dict[str, Any]) -> bytes:
         """Return an event as an entry of a log: who, what, details."""
         detail = " ".join(str(row[key]) for key in ("user", "detail") if row.get(key))
-        stamp = self._header(self._time(row["step"]), "").stamp
-        text = f"{row['event']} {detail}".strip()
-        fields = (stamp, _LEVELS, row["entity"], text, "", row["event"], 0)
-        return self._data(self._new("rcl_interfaces/msg/Log", *fields))
+        fields = {
+            "stamp": stamp_at(self._time(row["step"])),
+            "level": _LEVELS,
+            "name": row["entity"],
+            "msg": f"{row['event']} {detail}".strip(),
+            "function": row["event"],
+        }
+        return self._encode("rcl_interfaces/msg/Log", fields)
 
     def json_text(self, row: dict[str, Any]) -> bytes:
         """Return a row of any table as JSON in a string."""
-        return self._data(self._new("std_msgs/msg/String", json.dumps(row, default=str)))
+        return self._encode("std_msgs/msg/String", {"data": json.dumps(row, default=str)})
 
 
 class Template:

@@ -7,14 +7,17 @@ Frames and stamps are those of `fleet2d export`: the truth about bodies is in `/
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fleet2d.engine.simulation import Simulation
 from fleet2d.kernels import F64, Mesh, region_outline, visible_region
-from fleet2d.live.bridge import LiveStep
 from fleet2d.runtime.local_time import stamp_us
+
+if TYPE_CHECKING:
+    from fleet2d.engine.simulation import Simulation
+    from fleet2d.floorplan.plan import FloorPlan
+    from fleet2d.live.bridge import LiveStep
 
 BEAMS = 360
 """Number of beams of a laser scan, over a whole turn."""
@@ -23,6 +26,8 @@ EXACT = np.zeros(36)
 """The covariance of what is known exactly."""
 PERSON_M = (0.4, 0.4, 1.7)
 """The box of a detected person, whose true size no robot knows: x, y, z [m]."""
+UNKNOWN = "unknown"
+"""The class of a detected person who wasn't recognized."""
 _CHARGING, _DISCHARGING, _NOT_CHARGING = 1, 2, 3  # of sensor_msgs/msg/BatteryState
 
 
@@ -40,7 +45,9 @@ class RosTopic(NamedTuple):
     is_latched: bool = False
 
 
-Message = tuple[RosTopic, Mapping[str, Any]]
+Fields = Mapping[str, Any]
+"""A message, or a part of one, as a mapping of its fields."""
+Message = tuple[RosTopic, Fields]
 
 
 class RosTopics:
@@ -50,7 +57,7 @@ class RosTopics:
         all: The topics, in the order in which a step is published.
     """
 
-    def __init__(self, simulation: Simulation, root: str | None = None) -> None:
+    def __init__(self, simulation: "Simulation", root: str | None = None) -> None:
         """Find out what topics there are.
 
         Args:
@@ -97,27 +104,17 @@ class RosTopics:
 
     def stamp(self, step: int) -> dict[str, int]:
         """Return the simulated time of a step."""
-        seconds, nanoseconds = divmod(self.time_ns(step), 10**9)
-        return {"sec": seconds, "nanosec": nanoseconds}
+        return stamp_at(self.time_ns(step))
 
     def once(self, step: int = 0) -> Iterator[Message]:
         """Yield what is latched: the map, and the frames that don't move."""
-        plan = self._simulation.home.plan
-        lattice = plan.lattice
-        info = {
-            "map_load_time": self.stamp(step),
-            "resolution": lattice.cell,
-            "width": lattice.columns,
-            "height": lattice.rows,
-            "origin": pose_at(*lattice.origin, 0.0),
-        }
-        cells = np.where(plan.free, 0, 100).astype(np.int8).ravel()
-        yield self._map, {"header": self._header(step, "map"), "info": info, "data": cells}
+        header = self._header(step, "map")
+        yield self._map, occupancy_grid(header, self._simulation.home.plan)
         still = pose_at(0.0, 0.0, 0.0)
-        fixed = [self._transform(step, "map", self.frame(r, "odom"), still) for r in self._robots]
+        fixed = [transform(header, self.frame(robot, "odom"), still) for robot in self._robots]
         yield self._static, {"transforms": fixed}
 
-    def of(self, frame: LiveStep) -> Iterator[Message]:
+    def of(self, frame: "LiveStep") -> Iterator[Message]:
         """Yield the messages of a step, the clock first: who hears a stamp knows its time."""
         step = frame.step
         yield self._clock, {"clock": self.stamp(step)}
@@ -137,17 +134,9 @@ class RosTopics:
     def _moved(self, step: int, name: str, body: Mapping[str, Any]) -> dict[str, Any]:
         pose = pose_at(body["x"], body["y"], body["heading"])
         if name not in self._robots:
-            return self._transform(step, "map", name, pose)
-        return self._transform(step, self.frame(name, "odom"), self.frame(name, "base_link"), pose)
-
-    def _transform(
-        self, step: int, parent: str, child: str, pose: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        return {
-            "header": self._header(step, parent),
-            "child_frame_id": child,
-            "transform": {"translation": pose["position"], "rotation": pose["orientation"]},
-        }
+            return transform(self._header(step, "map"), name, pose)
+        header = self._header(step, self.frame(name, "odom"))
+        return transform(header, self.frame(name, "base_link"), pose)
 
     def _odometry(self, step: int, robot: str, body: Mapping[str, Any]) -> dict[str, Any]:
         x = body["x"]
@@ -161,13 +150,9 @@ class RosTopics:
         ahead = dx * math.cos(heading) + dy * math.sin(heading)
         left = dy * math.cos(heading) - dx * math.sin(heading)
         turn = (heading - before[2] + math.pi) % (2 * math.pi) - math.pi
-        twist = {"linear": vector(ahead, left), "angular": vector(0.0, 0.0, turn / passed_s)}
-        return {
-            "header": self._header(step, self.frame(robot, "odom")),
-            "child_frame_id": self.frame(robot, "base_link"),
-            "pose": {"pose": pose_at(x, y, heading), "covariance": EXACT},
-            "twist": {"twist": twist, "covariance": EXACT},
-        }
+        header = self._header(step, self.frame(robot, "odom"))
+        speeds = (ahead, left, turn / passed_s)
+        return odometry(header, self.frame(robot, "base_link"), pose_at(x, y, heading), speeds)
 
     def _scan(self, step: int, robot: str, body: Mapping[str, Any]) -> dict[str, Any]:
         home = self._simulation.home
@@ -209,21 +194,16 @@ class RosTopics:
 
     def _detections(self, step: int, rows: list[Any]) -> dict[str, Any]:
         header = self._header(step, "map")
-        box = dict(zip("xyz", PERSON_M, strict=True))
         detections = []
         for row in rows:
-            user = row["user"] or "unknown"
             pose = pose_at(row["x"], row["y"], 0.0)
-            hypothesis = {"class_id": user, "score": 1.0}
-            result = {"hypothesis": hypothesis, "pose": {"pose": pose, "covariance": EXACT}}
-            extent = {"center": pose, "size": box}
-            detections.append({"header": header, "id": user, "results": [result], "bbox": extent})
+            detections.append(detection(header, row["user"] or UNKNOWN, pose, pose))
         return {"header": header, "detections": detections}
 
     def _people(self, step: int, rows: list[Any]) -> dict[str, Any]:
         people = [
             {
-                "name": row["user"] or "unknown",
+                "name": row["user"] or UNKNOWN,
                 "position": vector(row["x"], row["y"]),
                 "velocity": vector(),
                 "reliability": 1.0,
@@ -243,8 +223,63 @@ def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> dict[str, float]:
 
 def pose_at(x: float, y: float, heading: float) -> dict[str, Any]:
     """Return a pose on the floor."""
-    turn = {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
-    return {"position": vector(x, y), "orientation": turn}
+    return pose_of(x, y, math.sin(heading / 2), math.cos(heading / 2))
+
+
+def pose_of(x: float, y: float, z: float, w: float) -> dict[str, Any]:
+    """Return the pose on the floor whose quaternion has a z and w."""
+    return {"position": vector(x, y), "orientation": {"x": 0.0, "y": 0.0, "z": z, "w": w}}
+
+
+def stamp_at(time_ns: int) -> dict[str, int]:
+    """Return a time [ns since 1970] as ROS writes it."""
+    seconds, nanoseconds = divmod(time_ns, 10**9)
+    return {"sec": seconds, "nanosec": nanoseconds}
+
+
+def occupancy_grid(header: Fields, plan: "FloorPlan") -> dict[str, Any]:
+    """Return the fields of the OccupancyGrid of a floor plan."""
+    lattice = plan.lattice
+    info = {
+        "map_load_time": header["stamp"],
+        "resolution": lattice.cell,
+        "width": lattice.columns,
+        "height": lattice.rows,
+        "origin": pose_at(*lattice.origin, 0.0),
+    }
+    cells = np.where(plan.free, 0, 100).astype(np.int8).ravel()
+    return {"header": header, "info": info, "data": cells}
+
+
+def transform(header: Fields, child: str, pose: Fields) -> dict[str, Any]:
+    """Return the fields of the TransformStamped of a frame at a pose."""
+    moved = {"translation": pose["position"], "rotation": pose["orientation"]}
+    return {"header": header, "child_frame_id": child, "transform": moved}
+
+
+def odometry(
+    header: Fields, child: str, pose: Fields, speeds: tuple[float, float, float]
+) -> dict[str, Any]:
+    """Return the fields of the Odometry of a robot, by its speeds ahead, to the left and turning.
+
+    Speeds are in m/s and rad/s.
+    """
+    ahead, left, turning = speeds
+    twist = {"linear": vector(ahead, left), "angular": vector(0.0, 0.0, turning)}
+    return {
+        "header": header,
+        "child_frame_id": child,
+        "pose": {"pose": pose, "covariance": EXACT},
+        "twist": {"twist": twist, "covariance": EXACT},
+    }
+
+
+def detection(header: Fields, user: str, pose: Fields, centre: Fields) -> dict[str, Any]:
+    """Return the fields of the Detection3D of a person, by its pose and its box's."""
+    hypothesis = {"class_id": user, "score": 1.0}
+    result = {"hypothesis": hypothesis, "pose": {"pose": pose, "covariance": EXACT}}
+    extent = {"center": centre, "size": vector(*PERSON_M)}
+    return {"header": header, "id": user, "results": [result], "bbox": extent}
 
 
 def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:

@@ -60,6 +60,59 @@ def navigate_definition(distribution: str) -> str:
     return f"{_NAVIGATE_GOAL}{_NAVIGATE_RESULT}{_NAVIGATE_FEEDBACK}{errors}"
 
 
+class MessageEncoder:
+    """Serializes messages that are mappings of their fields, by a store of types of rosbags."""
+
+    def __init__(self, store: Any) -> None:
+        """Take the store; types may be added to it later."""
+        from rosbags.interfaces import Nodetype
+
+        self._store = store
+        self._nodes: Any = Nodetype
+        self._converter = cache(self._make_converter)
+
+    def encode(self, name: str, fields: Mapping[str, Any]) -> bytes:
+        """Return a message as CDR, with its header; fields that are left out are 0 or empty.
+
+        Raises:
+            KeyError: The type has no such field.
+        """
+        return bytes(self._store.serialize_cdr(self._converter(name)(fields), name))
+
+    def _make_converter(self, name: str) -> Callable[[Mapping[str, Any]], Any]:
+        """Return what makes a message of a type from a mapping."""
+        cls = self._store.types[name]
+        parts = {field: self._converter_of(kind) for field, kind in self._store.fielddefs[name][1]}
+        blank = {field: partial(convert, None) for field, convert in parts.items()}
+
+        def convert(fields: Mapping[str, Any] | None) -> Any:
+            given = {field: parts[field](value) for field, value in (fields or {}).items()}
+            rest = {field: make() for field, make in blank.items() if field not in given}
+            return cls(**given, **rest)
+
+        return convert
+
+    def _converter_of(self, kind: Any) -> Callable[[Any], Any]:
+        """Return what makes a field from its value, or from None what it is by default."""
+        node, rest = kind
+        if node == self._nodes.NAME:
+            return lambda value: self._converter(rest)(value)
+        if node == self._nodes.BASE:
+            zero = "" if rest[0] in _TEXTS else _ZEROS.get(rest[0], 0)
+            return lambda value: zero if value is None else value
+        item, count = rest
+        length = count if node == self._nodes.ARRAY else 0
+        if item[0] == self._nodes.BASE and item[1][0] not in _TEXTS:
+            dtype = np.dtype({"octet": "uint8"}.get(item[1][0], item[1][0]))
+            return lambda value: (
+                np.zeros(length, dtype) if value is None else np.asarray(value, dtype)
+            )
+        convert = self._converter_of(item)
+        return lambda value: [
+            convert(part) for part in ([None] * length if value is None else value)
+        ]
+
+
 class RosTypes:
     """The types of a distribution of ROS 2, with those that Fleet2D adds.
 
@@ -97,7 +150,7 @@ class RosTypes:
         self._add_service("action_msgs/srv/CancelGoal", _CANCEL)
         self._add_action(NAVIGATE, navigate_definition(distribution))
         self.hash = cache(self._hash)
-        self._converter = cache(self._make_converter)
+        self._encoder = MessageEncoder(self._store)
 
     def _correct_chars(self) -> None:
         """Let char be uint8, as rosidl has it: else each hash of a service would differ."""
@@ -180,7 +233,7 @@ class RosTypes:
         Raises:
             KeyError: The type has no such field.
         """
-        return bytes(self._store.serialize_cdr(self._converter(name)(fields), name))
+        return self._encoder.encode(name, fields)
 
     def decode(self, name: str, data: bytes) -> dict[str, Any]:
         """Return the fields of a message, arrays as NumPy's.
@@ -194,39 +247,6 @@ class RosTypes:
             raise ValueError(f"no {name}: {error}") from error
         fields: dict[str, Any] = _as_mapping(message)
         return fields
-
-    def _make_converter(self, name: str) -> Callable[[Mapping[str, Any]], Any]:
-        """Return what makes a message of a type from a mapping."""
-        cls = self._store.types[name]
-        parts = {field: self._converter_of(kind) for field, kind in self._store.fielddefs[name][1]}
-        blank = {field: partial(convert, None) for field, convert in parts.items()}
-
-        def convert(fields: Mapping[str, Any] | None) -> Any:
-            given = {field: parts[field](value) for field, value in (fields or {}).items()}
-            rest = {field: make() for field, make in blank.items() if field not in given}
-            return cls(**given, **rest)
-
-        return convert
-
-    def _converter_of(self, kind: Any) -> Callable[[Any], Any]:
-        """Return what makes a field from its value, or from None what it is by default."""
-        node, rest = kind
-        if node == self._nodes.NAME:
-            return lambda value: self._converter(rest)(value)
-        if node == self._nodes.BASE:
-            zero = "" if rest[0] in _TEXTS else _ZEROS.get(rest[0], 0)
-            return lambda value: zero if value is None else value
-        item, count = rest
-        length = count if node == self._nodes.ARRAY else 0
-        if item[0] == self._nodes.BASE and item[1][0] not in _TEXTS:
-            dtype = np.dtype({"octet": "uint8"}.get(item[1][0], item[1][0]))
-            return lambda value: (
-                np.zeros(length, dtype) if value is None else np.asarray(value, dtype)
-            )
-        convert = self._converter_of(item)
-        return lambda value: [
-            convert(part) for part in ([None] * length if value is None else value)
-        ]
 
 
 def _parts(definition: str) -> list[str]:
