@@ -3,7 +3,9 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.scenes import Cli
@@ -116,6 +118,28 @@ def test_unknown_tutorial_is_told_with_the_nearest_name(here: Path, fleet2d: Cli
     assert [] == list(here.iterdir())
 
 
+def run_of(calls: list[list[str]], code: int) -> Callable[..., Any]:
+    """What takes the place of `subprocess.run`, and keeps the commands."""
+
+    def run(command: list[str], check: bool) -> subprocess.CompletedProcess[str]:
+        calls.append(command)
+        return subprocess.CompletedProcess(command, code)
+
+    return run
+
+
+def test_where_jupyter_refuses_as_to_root_it_is_told_where_the_notebook_is(
+    here: Path, fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tutorials, "find_spec", lambda name: name == "notebook" or None)
+    monkeypatch.setattr(subprocess, "run", run_of([], 1))
+
+    code, out, _ = fleet2d("demo", "--tutorial", "study")
+
+    assert 0 == code
+    assert out.startswith("study.ipynb: open it")
+
+
 @pytest.mark.parametrize(("options", "opened"), [((), True), (("--no-view",), False)])
 def test_jupyter_opens_it_where_it_is_installed(
     here: Path,
@@ -126,7 +150,7 @@ def test_jupyter_opens_it_where_it_is_installed(
 ) -> None:
     calls: list[list[str]] = []
     monkeypatch.setattr(tutorials, "find_spec", lambda name: name == "notebook" or None)
-    monkeypatch.setattr(subprocess, "run", lambda command, check: calls.append(command))
+    monkeypatch.setattr(subprocess, "run", run_of(calls, 0))
 
     code, out, _ = fleet2d("demo", "--tutorial", "study", *options)
 

@@ -93,9 +93,10 @@ def _cell(kind: str, source: str, **more: Any) -> dict[str, Any]:
 
 
 def open_in_jupyter(path: Path) -> bool:
-    """Open a notebook in Jupyter until that is shut down; return whether it is installed."""
+    """Open a notebook in Jupyter until that is shut down; return whether that was possible."""
     program = next((module for module in JUPYTER if find_spec(module)), None)
-    if program is not None:
-        command = [sys.executable, "-m", program, str(path)]
-        subprocess.run(command, check=False)  # noqa: S603 - it is Python, and a file of ours
-    return program is not None
+    if program is None:
+        return False
+    command = [sys.executable, "-m", program, str(path)]
+    done = subprocess.run(command, check=False)  # noqa: S603 - it is Python, and a file of ours
+    return done.returncode == 0
