@@ -1,7 +1,6 @@
 #include "routes.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <limits>
 #include <queue>
 #include <utility>
@@ -74,8 +73,14 @@ struct Search {
     Array<f64> travelled = Array<f64>::filled(nodes, INFINITE);  // from the start
     Array<f64> bound = Array<f64>::filled(nodes, INFINITE);      // travelled + straight line to the goal, if open
     Array<i32> before = Array<i32>::filled(nodes, -1);           // the corner before; -1 = the start
-    using Entry = std::pair<f64, i64>;  // bound and corner: of equal bounds, the lower corner comes first
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue{};
+    using Entry = std::pair<f64, i64>;                           // bound and corner
+    // Of equal bounds the lower corner comes first. (The order of pairs themselves allows for NaN, which takes longer.)
+    struct IsLater {
+        bool operator()(const Entry& a, const Entry& b) const {
+            return a.first == b.first ? a.second > b.second : a.first > b.first;
+        }
+    };
+    std::priority_queue<Entry, std::vector<Entry>, IsLater> queue{};
 
     Point at(i64 node) const { return mesh.vertex(graph.vertex[node]); }
 

@@ -15,7 +15,7 @@ from fleet2d.configuration.units import PositiveDuration
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import read_only
 from fleet2d.floorplan.space import Space
-from fleet2d.kernels import F64, I64, SUB, Bool
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels import earth_mover as minimal_cost
 from fleet2d.metrics.metric import Metric
 from fleet2d.runtime.clock import DAY_US, HOUR_US
@@ -232,8 +232,8 @@ def _distances(home: Home, space: Space) -> F64:
     for room in home.rooms:
         x, y = lattice.point_at(room.anchor_xy)
         places.append(space.nearest(x, y, None, room.index) or (x, y))
-    columns, rows = np.array(places, np.int64).reshape(-1, 2).T // SUB
-    metres = np.array([space.distance_field(np.array([place]))[rows, columns] for place in places])
+    points = np.array(places, np.int64).reshape(-1, 2)
+    metres = np.array([space.distances(place, points) for place in places])
     metres = np.minimum(metres, metres.T)
     is_reachable = np.isfinite(metres)
     longest = float(metres[is_reachable].max(initial=0.0)) or 1.0
