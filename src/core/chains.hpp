@@ -169,8 +169,8 @@ private:
 
 // The filtered distributions: given the evidence up to each stretch; index 0 is before the first stretch.
 //
-// Robots see few rooms at a time. Where `visible` is false, nothing of the room is in view of anybody in the group, and
-// `in_view` is 0: that half of the states can be skipped, without changing any sum.
+// Robots see few rooms at a time. Where `visible` is false, nothing of the room is in view of anybody in the group:
+// that half of the states can be skipped, without changing any sum, and is set to 0 only where it is needed.
 template <int W>
 struct Filtered {
     Array<Lanes<W>, 3> in_view;  // (steps + 1, stages, patches) probability of each state in view
@@ -181,28 +181,16 @@ struct Filtered {
     Array<Lanes<W>> scale;       // (steps,) factor that normalized the probabilities
 
     // Make room for so many steps; the memory of another group is used again.
-    void clear(const StayModel& layout, i64 steps) {
+    void fit(const StayModel& layout, i64 steps) {
         const i64 stages = layout.stages(), patches = layout.patches(), rooms = layout.rooms();
-        if (scale.size() < steps || hidden.shape()[1] != stages || hidden.shape()[2] != patches) {
-            const i64 count = steps + steps / 8;
-            in_view = Array<Lanes<W>, 3>::zeros({count + 1, stages, patches});
-            hidden = Array<Lanes<W>, 3>::empty({count + 1, stages, patches});
-            visible = Array<bool, 2>::zeros({count + 1, rooms});
-            mass = Array<Lanes<W>, 2>::empty({count + 1, layout.nodes()});
-            likely = Array<Lanes<W>, 2>::empty({count, 2});
-            scale = Array<Lanes<W>>::empty({count});
-            return;
-        }
-        for (i64 t = 0; t < visible.size(); ++t) {
-            for (i64 room = 0; room < rooms; ++room) {
-                if (!visible(t, room)) continue;
-                visible(t, room) = false;
-                const auto [begin, end] = layout.patches_of(room);
-                for (i64 stage = 0; stage < stages; ++stage) {
-                    for (Lanes<W>& part : in_view[t][stage].slice(begin, end)) part = 0.0;
-                }
-            }
-        }
+        if (scale.size() >= steps && hidden.shape()[1] == stages && hidden.shape()[2] == patches) return;
+        const i64 count = steps + steps / 8;
+        in_view = Array<Lanes<W>, 3>::empty({count + 1, stages, patches});
+        hidden = Array<Lanes<W>, 3>::empty({count + 1, stages, patches});
+        visible = Array<bool, 2>::empty({count + 1, rooms});
+        mass = Array<Lanes<W>, 2>::empty({count + 1, layout.nodes()});
+        likely = Array<Lanes<W>, 2>::empty({count, 2});
+        scale = Array<Lanes<W>>::empty({count});
     }
 };
 
@@ -218,10 +206,20 @@ public:
           rooms_(model_.rooms()),
           stages_(model_.stages()),
           comers_(Array<Lanes<W>>::empty({rooms_})) {
-        filtered.clear(model_, group.steps());
+        filtered.fit(model_, group.steps());
         begin();
     }
 
+    // Advance over all stretches.
+    void run() {
+        const i64 count = group_.steps();
+        for (i64 t = 0; t < count; ++t) step(t);
+        for (i64 room = 0; room < rooms_; ++room) {
+            if (!filtered_.visible(count, room)) hide(count, room);
+        }
+    }
+
+private:
     // Advance over one stretch of each person.
     void step(i64 t) {
         steps_.go_to(t);
@@ -232,7 +230,10 @@ public:
             filtered_.likely(t, 1)[lane] = weight;
         }
         count_comers(t);
-        for (i64 room = 0; room < rooms_; ++room) filtered_.visible(t + 1, room) = becomes_visible(t, room);
+        for (i64 room = 0; room < rooms_; ++room) {
+            const bool visible = filtered_.visible(t + 1, room) = becomes_visible(t, room);
+            if (visible && !filtered_.visible(t, room)) hide(t, room);
+        }
         for (i64 stage = 0; stage < stages_; ++stage) predict(t, stage);
         steps_.sightings(t, filtered_.likely[t], [&](int lane, i64 p, bool in_view, f64 factor) {
             const View<Lanes<W>, 2> states = in_view ? filtered_.in_view[t + 1] : filtered_.hidden[t + 1];
@@ -242,9 +243,17 @@ public:
         normalize(t);
     }
 
-private:
+    // Set the states in view of a room to 0.
+    void hide(i64 t, i64 room) {
+        const auto [begin, end] = model_.patches_of(room);
+        for (i64 stage = 0; stage < stages_; ++stage) {
+            for (Lanes<W>& part : filtered_.in_view[t][stage].slice(begin, end)) part = 0.0;
+        }
+    }
+
     // Set the distribution before the first stretch.
     void begin() {
+        std::ranges::fill(filtered_.visible[0], false);
         for (i64 stage = 0; stage < stages_; ++stage) {
             const View<Lanes<W>> in_view = filtered_.in_view[0][stage], hidden = filtered_.hidden[0][stage];
             for (int lane = 0; lane < W; ++lane) {

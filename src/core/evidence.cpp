@@ -1,7 +1,12 @@
 #include "evidence.hpp"
 
+#include <algorithm>
 #include <cstring>
+#include <tuple>
 #include <utility>
+
+#include "lanes.hpp"
+#include "lattice.hpp"
 
 namespace fleet2d {
 
@@ -158,6 +163,54 @@ void reduce(const Array<f64, 2>& values, i64 count, View<f64> sum) {
 
 }  // namespace
 
+SightingCounts list_sightings(View<const i64> step, View<const i32> index, View<const i64> user, View<const i64> room,
+                              i64 bin_steps, std::array<i64, 3> shape) {
+    struct Entry {
+        i64 user, bin, room, steps, last;  // the step that was counted last
+    };
+    std::vector<Entry> entries;
+    const auto [bins, users, rooms] = shape;
+    auto newest = Array<i64, 2>::filled({users, rooms}, -1);  // entry
+    i64 bin = -1, begin = 0;                                  // of the bin
+    for (i64 i = 0, next = 0; i < step.size(); i = next) {
+        const i64 at = step[i], number = index[i];
+        if (bin < 0 || at < begin || at - begin >= bin_steps) {
+            bin = floor_div(at, bin_steps);
+            if (bin >= bins) bin = -1;
+            begin = std::max(bin, i64{0}) * bin_steps;
+        }
+        // While nobody moves, the same sighting repeats at the next steps of the bin.
+        const auto repeats = [&](i64 k) {
+            return index[k] == number && step[k] > step[k - 1] && step[k] - begin < bin_steps;
+        };
+        next = i + 1;
+        if (bin < 0 || room[number] < 0) continue;
+        while (next < step.size() && repeats(next)) ++next;
+        for (const i64 who : {user[number], users - 1}) {
+            if (who < 0) continue;
+            i64& known = newest(who, room[number]);
+            if (known < 0 || entries[static_cast<std::size_t>(known)].bin != bin) {
+                known = static_cast<i64>(entries.size());
+                entries.push_back({who, bin, room[number], 0, -1});
+            }
+            Entry& entry = entries[static_cast<std::size_t>(known)];
+            entry.steps += next - i - (entry.last == at ? 1 : 0);
+            entry.last = step[next - 1];
+        }
+    }
+    std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+        return std::tie(a.user, a.bin, a.room) < std::tie(b.user, b.bin, b.room);
+    });
+    const std::array<i64, 1> count{static_cast<i64>(entries.size())};
+    SightingCounts made{Array<i64>::empty(count), Array<i64>::empty(count), Array<i64>::empty(count),
+                        Array<i64>::empty(count)};
+    for (i64 i = 0; i < count[0]; ++i) {
+        const Entry& entry = entries[static_cast<std::size_t>(i)];
+        made.user[i] = entry.user, made.bin[i] = entry.bin, made.room[i] = entry.room, made.steps[i] = entry.steps;
+    }
+    return made;
+}
+
 Views gather_views(View<const i64, 4> cells, const PatchSizes& patches, i64 bin_steps) {
     const i64 bins = cells.shape[0], count = patches.room.size(), rooms = patches.room_cells.size();
     Views views{Array<f64, 2>::empty({bins, rooms}), Array<f64, 2>::empty({bins, count}),
@@ -204,10 +257,11 @@ WatchedViews watched_views(View<const u8, 2> shown, const PatchSightings& sighti
     return {std::move(view), Array<u8, 2>::copy_of({views.data(), {count, patches + 1}})};
 }
 
-Array<f64, 3> sum_places(const std::vector<Chain>& chains, View<const bool, 2> unknown, i64 users,
-                         View<const i64> first) {
-    const i64 bins = unknown.size(), width = 2 * (unknown.shape[1] + 1) + 1, rows = users > 0 ? users + 1 : 1;
-    auto sums = Array<f64, 3>::empty({first.size(), rows, width});
+namespace {
+
+void add_places(const std::vector<Chain>& chains, View<const bool, 2> unknown, i64 users, View<const i64> first,
+                View<f64, 3> sums) {
+    const i64 bins = unknown.size(), width = sums.shape[2];
     std::vector<Cursor> cursors(chains.begin(), chains.end());
     Array<f64, 2> values;
     for (i64 h = 0; h < first.size(); ++h) {
@@ -227,6 +281,15 @@ Array<f64, 3> sum_places(const std::vector<Chain>& chains, View<const bool, 2> u
         for (i64 t = 0; t < count; ++t) set_values(anyone.places(t), values[t]);
         reduce(values, count, sums[h][row]);
     }
+}
+
+}  // namespace
+
+Array<f64, 3> sum_places(const std::vector<Chain>& chains, View<const bool, 2> unknown, i64 users,
+                         View<const i64> first) {
+    const i64 width = 2 * (unknown.shape[1] + 1) + 1, rows = users > 0 ? users + 1 : 1;
+    auto sums = Array<f64, 3>::empty({first.size(), rows, width});
+    side_by_side<1>([&] { add_places(chains, unknown, users, first, sums); });  // several places at once
     return sums;
 }
 

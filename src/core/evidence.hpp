@@ -1,12 +1,26 @@
 // Evidence in bins of time: how much of each room and of each patch was in view; and sums of presence by hour.
 #pragma once
 
-#include <tuple>
+#include <array>
 #include <vector>
 
 #include "array.hpp"
 
 namespace fleet2d {
+
+// At how many steps of each bin users were perceived in each room, where that isn't 0: arrays of one length, by user,
+// bin and room, ascending.
+struct SightingCounts {
+    Array<i64> user, bin, room, steps;
+};
+
+// Count the steps at which each user was perceived in each room, once however often.
+//
+// `step` (n,) is in order of time, from the beginning of the first bin. Most sightings repeat another one at another
+// step: `index` (n,) is the number of each among the distinct ones, of which `user` (k,) is below 0 for somebody
+// unknown, and `room` (k,) below 0 for none. `shape` is (bins, users + 1, rooms); its last user is anybody.
+SightingCounts list_sightings(View<const i64> step, View<const i32> index, View<const i64> user, View<const i64> room,
+                              i64 bin_steps, std::array<i64, 3> shape);
 
 // The patches of rooms.
 struct PatchSizes {

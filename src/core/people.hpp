@@ -58,6 +58,34 @@ struct PeopleMoments {
     }
 };
 
+// What was learned of people, as in PeopleMoments.
+struct KnownMoments {
+    View<const f64, 2> time;
+    View<const f64, 3> exits;
+    View<const f64, 2> arrivals;
+    View<const f64, 2> moves;
+    View<const f64, 2> rests;
+};
+
+// What is assumed of people before anything is learned.
+struct StayPrior {
+    View<const f64> length;    // (stages,) mean length of each stage of a stay [bins]
+    View<const f64> spread;    // (patches,) share of each patch in its room, above 0
+    View<const f64> possible;  // (rooms,) 1 for the places where people may be, 0 for the others
+    View<const i64> first;     // (rooms + 1,) as in StayModel
+    f64 restless = 0;          // probability per bin of changing patch
+};
+
+// The most probable transitions, as in PeopleModel.
+struct LearnedStays {
+    Array<f64, 2> stay;
+    Array<f64, 3> follow;
+    Array<f64, 2> spread, restless;
+};
+
+// Return the most probable transitions: expected counts by expected time, with one event of each kind before.
+LearnedStays learned_stays(const KnownMoments& moments, const StayPrior& prior);
+
 // Where people were in their stretches.
 struct PeoplePlaces {
     Array<f64, 2> places;  // (stretches of all people, rooms) P(room) in each

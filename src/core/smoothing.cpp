@@ -340,7 +340,7 @@ void smooth_group(const Group<W>& group, Filtered<W>& filtered, const std::array
     const i64 count = group.steps();
     Steps<W> steps(group);
     ForwardPass<W> forward(group, steps, filtered);
-    for (i64 t = 0; t < count; ++t) forward.step(t);
+    forward.run();
     BackwardPass<W> backward(group, steps, filtered);
     for (std::size_t lane = 0; lane < W; ++lane) {
         const View<f64, 2> end = ends[lane].end;

@@ -1,5 +1,7 @@
 #include "stays.hpp"
 
+#include <algorithm>
+#include <array>
 #include <vector>
 
 #include "lattice.hpp"
@@ -38,7 +40,7 @@ void follow_group(const Group<W>& group, Filtered<W>& filtered, const std::array
     const i64 count = group.steps();
     Steps<W> steps(group);
     ForwardPass<W> pass(group, steps, filtered);
-    for (i64 t = 0; t < count; ++t) pass.step(t);
+    pass.run();
     for (std::size_t lane = 0; lane < static_cast<std::size_t>(group.people); ++lane) {
         for (i64 t = 0; t < places[lane].size(); ++t) {
             const View<const Lanes<W>> mass = filtered.mass[t + 1];
@@ -187,6 +189,88 @@ PeoplePlaces follow_people(const PeopleModel& model, const DayEvidence& day, i64
         }
     });
     return result;
+}
+
+namespace {
+
+// The sum of numbers as NumPy adds up a row: eight sums side by side, and halves of more than 128 numbers apart.
+f64 sum_of(View<const f64> numbers) {
+    const i64 count = numbers.size();
+    if (count > 128) {
+        const i64 half = count / 2 - count / 2 % 8;
+        return sum_of(numbers.slice(0, half)) + sum_of(numbers.slice(half, count));
+    }
+    f64 sum = 0.0;
+    i64 i = 0;
+    if (count >= 8) {
+        std::array<f64, 8> part{};
+        for (; i < count - count % 8; ++i) part[static_cast<std::size_t>(i % 8)] += numbers[i];
+        sum = ((part[0] + part[1]) + (part[2] + part[3])) + ((part[4] + part[5]) + (part[6] + part[7]));
+    }
+    for (; i < count; ++i) sum += numbers[i];
+    return sum;
+}
+
+// How often a person went to each place, and once to one of them before anything was learned: (rooms,).
+Array<f64> entries(View<const f64, 2> exits, View<const f64> possible) {
+    const i64 rooms = possible.size();
+    auto entered = Array<f64>::zeros({rooms});
+    for (i64 k = 0; k < exits.size(); ++k) {
+        for (i64 room = 0; room < rooms; ++room) entered[room] += exits(k, room);
+    }
+    const f64 places = sum_of(possible);
+    for (i64 room = 0; room < rooms; ++room) entered[room] += possible[room] / places;
+    return entered;
+}
+
+// Set where stays go on after each stage, and how likely it lasts for another bin.
+void learn_stays(const KnownMoments& moments, i64 person, const StayPrior& prior, View<f64> stay, View<f64, 2> follow) {
+    const i64 rooms = prior.possible.size(), stages = prior.length.size();
+    const Array<f64> entered = entries(moments.exits[person], prior.possible);
+    for (i64 room = 0; room < rooms; ++room) {
+        auto others = Array<f64>::copy_of(entered);
+        others[room] = 0.0;
+        const f64 total = sum_of(others);
+        for (i64 stage = 0; stage < stages; ++stage) {
+            const i64 k = room * stages + stage;
+            const View<const f64> exits = moments.exits[person][k];
+            const f64 ends = sum_of(exits) + 1.0, onward = stage + 1 < stages ? 0.5 : 0.0;
+            stay[k] = 1.0 - ends / (moments.time(person, k) + prior.length[stage]);
+            for (i64 to = 0; to < rooms; ++to) {
+                follow(k, to) = (exits[to] + others[to] / total * (1.0 - onward)) / ends;
+            }
+            follow(k, rooms) = (exits[rooms] + onward) / ends;
+        }
+    }
+}
+
+// Set which patches people come to, and how likely they change patch.
+void learn_patches(const KnownMoments& moments, i64 person, const StayPrior& prior, View<f64> spread,
+                   View<f64> restless) {
+    const View<const f64> arrivals = moments.arrivals[person], moves = moments.moves[person];
+    const View<const f64> rests = moments.rests[person];
+    const i64 rooms = prior.possible.size();
+    for (i64 room = 0; room < rooms; ++room) {
+        const i64 begin = prior.first[room], end = prior.first[room + 1];
+        f64 total = 0.0;
+        for (i64 p = begin; p < end; ++p) total += spread[p] = arrivals[p] + prior.spread[p];
+        for (i64 p = begin; p < end; ++p) spread[p] /= total;
+        const f64 trials = moves[room] + rests[room] + 1.0 / std::max(prior.restless, 1e-6);
+        restless[room] = std::min((moves[room] + 1.0) / std::max(trials, 1.0), 1.0);
+    }
+    restless[rooms - 1] = 0.0;  // away has no patches
+}
+
+}  // namespace
+
+LearnedStays learned_stays(const KnownMoments& moments, const StayPrior& prior) {
+    LearnedStays learned{Array<f64, 2>::empty(moments.time.shape), Array<f64, 3>::empty(moments.exits.shape),
+                         Array<f64, 2>::empty(moments.arrivals.shape), Array<f64, 2>::empty(moments.moves.shape)};
+    for (i64 person = 0; person < moments.time.size(); ++person) {
+        learn_stays(moments, person, prior, learned.stay[person], learned.follow[person]);
+        learn_patches(moments, person, prior, learned.spread[person], learned.restless[person]);
+    }
+    return learned;
 }
 
 }  // namespace fleet2d

@@ -1343,6 +1343,19 @@ def advance(probability: numpy.typing.NDArray[numpy.float64], transition: numpy.
         float64 (states,).
     """
 
+def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64], replicates: int) -> numpy.typing.NDArray[numpy.float64]:
+    """
+    Sum days drawn with replacement.
+
+    Args:
+        key: Of the stream of draws.
+        days: float64 (days, values).
+        replicates: How many sums.
+
+    Returns:
+        float64 (replicates, values), each the sum of as many days as there are.
+    """
+
 def list_sightings(step: numpy.typing.NDArray[numpy.int64], index: numpy.typing.NDArray[numpy.int32], user: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], bin_steps: int, bins: int, users: int, rooms: int) -> tuple[numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]]:
     """
     Count the steps at which each user was perceived in each room, each step once, where that isn't 0.
@@ -1359,19 +1372,6 @@ def list_sightings(step: numpy.typing.NDArray[numpy.int64], index: numpy.typing.
 
     Returns:
         User, bin, room, and number of steps, int64 (n,) each, in ascending order.
-    """
-
-def resampled(key: int | numpy.uint64, days: numpy.typing.NDArray[numpy.float64], replicates: int) -> numpy.typing.NDArray[numpy.float64]:
-    """
-    Sum days drawn with replacement.
-
-    Args:
-        key: Of the stream of draws.
-        days: float64 (days, values).
-        replicates: How many sums.
-
-    Returns:
-        float64 (replicates, values), each the sum of as many days as there are.
     """
 
 def gather_views(cells: numpy.typing.NDArray[numpy.int64], room: numpy.typing.NDArray[numpy.int64], patch_cells: numpy.typing.NDArray[numpy.int64], room_cells: numpy.typing.NDArray[numpy.int64], bin_steps: int) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.uint8]]:
@@ -1553,6 +1553,25 @@ def follow_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, no
 
     Raises:
         ValueError: Arrays aren't of the same people, rooms and patches, or hold numbers of patches or bins that aren't.
+    """
+
+def learned_stays(moments: tuple[Any, ...], length: numpy.typing.NDArray[numpy.float64], spread: numpy.typing.NDArray[numpy.float64], possible: numpy.typing.NDArray[numpy.float64], first: numpy.typing.NDArray[numpy.int64], restless: float) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+    """
+    Return the most probable transitions of people: expected counts by expected time, with a prior.
+
+    Args:
+        moments: What was learned, with people as the first dimension.
+        length: float64 (stages,), mean length of each stage of a stay before anything is learned [bins].
+        spread: float64 (patches,), the share of each patch in its room.
+        possible: float64 (rooms + 1,), 1 for the places where people may be, away last, 0 for the others.
+        first: int64 (rooms + 2,), as of `StayModel`.
+        restless: Probability per bin of changing patch before anything is learned.
+
+    Returns:
+        The fields of `StayModel` before `first`, with people as the first dimension.
+
+    Raises:
+        ValueError: Arrays aren't of the same people, stages, rooms and patches.
     """
 
 def smooth_people(model: tuple[Any, ...], day: tuple[Any, ...], longest: int, prior: numpy.typing.NDArray[numpy.float64], future: numpy.typing.NDArray[numpy.float64], moments: tuple[Any, ...]) -> tuple[tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.int64], numpy.typing.NDArray[numpy.int64]], numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:

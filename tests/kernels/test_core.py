@@ -179,6 +179,7 @@ def test_the_core_exports_only_what_others_import_and_the_parts_that_are_tested(
 
 # Structs of the core with other names than their named tuples.
 NAMED_TUPLES = {
+    "KnownMoments": "Moments",
     "PeopleModel": "StayModel",
     "PeopleMoments": "Moments",
     "PosesToFill": "Poses",
@@ -439,6 +440,10 @@ def traced() -> TracedEvidence:
 
 def moments() -> Moments:
     return Moments(np.zeros(3), np.zeros((3, 4)), np.zeros(4), np.zeros(3), np.zeros(3))
+
+
+def moments_of_people() -> Moments:
+    return Moments(*(np.repeat(part[None], 5, axis=0) for part in moments()))
 
 
 def region(x: int = 200, y: int = 200) -> tuple[Any, Any]:
@@ -760,7 +765,15 @@ CALLS: dict[str, Args] = {
         2,
         np.full((5, 1, 4), 0.25),
         np.ones((5, 1, 4)),
-        Moments(*(np.repeat(part[None], 5, axis=0) for part in moments())),
+        moments_of_people(),
+    ),
+    "learned_stays": lambda: (
+        moments_of_people(),
+        np.array([120.0]),
+        np.full(4, 0.5),
+        np.ones(3),
+        np.array([0, 1, 3, 4]),
+        0.05,
     ),
     "Window": lambda: (
         0,

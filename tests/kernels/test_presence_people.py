@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.kernels.test_presence_stays import PATCHES, SIZES, by_place, case, no_moments
@@ -14,6 +15,7 @@ from fleet2d.kernels import (
     PeoplePlaces,
     StayModel,
     follow_people,
+    learned_stays,
     smooth_people,
 )
 
@@ -73,3 +75,31 @@ def test_people_side_by_side_are_the_products_of_their_own_matrices(
         assert np.abs(after - now[person]).max() < 1e-9
     in_home = moments.time.sum(axis=1)
     assert np.abs(in_home - BINS).max() < 1e-9
+
+
+@given(st.integers(0, 10_000), st.integers(1, 3), st.integers(1, 4), st.integers(1, 20))
+def test_learned_stays_are_those_of_whole_arrays(
+    seed: int, people: int, stages: int, rooms: int
+) -> None:
+    random = np.random.default_rng(seed)
+    places = rooms + 1
+    patches = random.integers(1, 5, places)
+    first = np.cumsum([0, *patches])
+    shapes = (places * stages,), (places * stages, places + 1), (first[-1],), (places,), (places,)
+    counts = Moments(*(random.choice([0, 0.25, 9], (people, *shape)) for shape in shapes))
+    length, spread = random.uniform(1, 200, stages), random.uniform(0.1, 1, first[-1])
+    possible = random.choice([0.0, 1.0], places)
+    possible[:2] = 1  # somewhere to go from each place
+    restless = float(random.choice([0, 0.05, 1]))
+    asked = counts, length, spread, possible, first, restless
+
+    for part, expected in zip(learned_stays(*asked), slow.learned_stays(*asked), strict=True):
+        assert part.shape == expected.shape
+        assert np.abs(part - expected).max(initial=0) < 1e-12
+
+
+@pytest.mark.parametrize("first", [[0, 2], [0, 1, 3], [1, 2, 4], [0, 3, 2, 4]])
+def test_learned_stays_refuse_other_places(first: list[int]) -> None:
+    counts = Moments(*(np.zeros(shape) for shape in ((1, 2), (1, 2, 3), (1, 4), (1, 2), (1, 2))))
+    with pytest.raises(ValueError, match="first must ascend from 0"):
+        learned_stays(counts, np.ones(1), np.ones(4), np.ones(2), np.array(first), 0.05)

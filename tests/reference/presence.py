@@ -273,3 +273,29 @@ def kendall(true: Sequence[float], guess: Sequence[float]) -> float:
     agree = sum((true[i] - true[j]) * (guess[i] - guess[j]) > 0 for i, j in pairs)
     differ = sum((true[i] - true[j]) * (guess[i] - guess[j]) < 0 for i, j in pairs)
     return (agree - differ) / len(pairs) if pairs else 1.0
+
+
+def learned_stays(
+    moments: Any, length: Any, spread: Any, possible: Any, first: Any, restless: float
+) -> tuple[Any, Any, Any, Any]:
+    """The most probable transitions, as sums and quotients of whole arrays."""
+    places, stages = len(possible), len(length)
+    time, exits, arrivals, moves, rests = moments
+    ends = exits.sum(axis=-1)
+    stay = 1 - (ends + 1) / (time + np.tile(length, places))
+    entered = exits[..., :places].sum(axis=-2) + possible / possible.sum()
+    others = np.repeat(entered[..., None, :], places, axis=-2)
+    others[..., np.arange(places), np.arange(places)] = 0.0
+    others = np.repeat(others / others.sum(axis=-1, keepdims=True), stages, axis=-2)
+    next_stage = np.tile(np.arange(stages) < stages - 1, places) / 2
+    prior_exits = np.empty_like(exits)
+    prior_exits[..., :places] = others * (1 - next_stage)[:, None]
+    prior_exits[..., places] = next_stage
+    follow = (exits + prior_exits) / (ends + 1)[..., None]
+    come = arrivals + spread
+    room = np.repeat(np.arange(places), np.diff(first))
+    in_room = np.array([[math.fsum(own[room == r]) for r in range(places)] for own in come])
+    trials = moves + rests + 1 / max(restless, 1e-6)
+    change = np.minimum((moves + 1) / np.maximum(trials, 1), 1)
+    change[..., -1] = 0.0  # away has no patches
+    return stay, follow, come / in_room[:, room], change

@@ -14,6 +14,9 @@ inline constexpr std::size_t border::members_of<DayEvidence> = 7;
 template <>
 inline constexpr std::size_t border::members_of<PeopleMoments> = 5;
 
+template <>
+inline constexpr std::size_t border::members_of<KnownMoments> = 5;
+
 namespace {
 
 void check_people(const PeopleModel& model) {
@@ -72,6 +75,41 @@ Returns:
 
 Raises:
     ValueError: Arrays aren't of the same people, rooms and patches, or hold numbers of patches or bins that aren't.)");
+    m.def(
+        "learned_stays",
+        [](const KnownMoments& moments, View<const f64> length, View<const f64> spread, View<const f64> possible,
+           View<const i64> first, f64 restless) {
+            const i64 people = moments.time.size(), rooms = possible.size(), patches = spread.size();
+            require(rooms > 0 && length.size() > 0 && first.size() == rooms + 1 && first[0] == 0 &&
+                        first[rooms] == patches && std::is_sorted(first.begin(), first.end()),
+                    "there must be rooms and stages, and first must ascend from 0 to the number of patches");
+            const i64 nodes = rooms * length.size();
+            require(moments.time.shape == std::array{people, nodes} &&
+                        moments.exits.shape == std::array{people, nodes, rooms + 1} &&
+                        moments.arrivals.shape == std::array{people, patches} &&
+                        moments.moves.shape == std::array{people, rooms} &&
+                        moments.rests.shape == std::array{people, rooms},
+                    "moments must be of people, and of the stages, rooms and patches of the others");
+            LearnedStays learned = learned_stays(moments, {length, spread, possible, first, restless});
+            return std::tuple(std::move(learned.stay), std::move(learned.follow), std::move(learned.spread),
+                              std::move(learned.restless));
+        },
+        "moments"_a, "length"_a, "spread"_a, "possible"_a, "first"_a, "restless"_a, Unlocked(),
+        R"(Return the most probable transitions of people: expected counts by expected time, with a prior.
+
+Args:
+    moments: What was learned, with people as the first dimension.
+    length: float64 (stages,), mean length of each stage of a stay before anything is learned [bins].
+    spread: float64 (patches,), the share of each patch in its room.
+    possible: float64 (rooms + 1,), 1 for the places where people may be, away last, 0 for the others.
+    first: int64 (rooms + 2,), as of `StayModel`.
+    restless: Probability per bin of changing patch before anything is learned.
+
+Returns:
+    The fields of `StayModel` before `first`, with people as the first dimension.
+
+Raises:
+    ValueError: Arrays aren't of the same people, stages, rooms and patches.)");
     m.def(
         "smooth_people",
         [](const PeopleModel& model, const DayEvidence& day, i64 longest, View<const f64, 3> prior,

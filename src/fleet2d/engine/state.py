@@ -4,7 +4,7 @@ from array import array
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, field
-from itertools import chain, islice, takewhile
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
@@ -323,10 +323,12 @@ class State:
         name = actor.name
         if begin == len(notes) or notes[begin].time_us > step * step_us:
             return ()
-        due = takewhile(lambda note: note.time_us <= step * step_us, islice(notes, begin, None))
-        events = [new_event((-(-time // step_us), name, kind, text)) for time, kind, text in due]
-        self.notes_emitted[row] = begin + len(events)
-        return events
+        end = begin + 1
+        while end < len(notes) and notes[end][0] <= step * step_us:
+            end += 1
+        self.notes_emitted[row] = end
+        due = notes[begin:end]
+        return [new_event((-(-time // step_us), name, kind, text)) for time, kind, text in due]
 
     def next_note(self, step: int, kinds: Set[str]) -> int | None:
         """Return the next step from `step` on at which a plan has an event of these kinds."""

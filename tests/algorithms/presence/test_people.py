@@ -70,25 +70,28 @@ def test_expected_exits_and_time_equal_pairs_of_states(seed: int, stages: int) -
 
 def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() -> None:
     layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
-    model = model_of(layout.no_moments(), layout, PRIOR)
-    assert [1 - 1 / MEAN_STAY] * 4 == pytest.approx(model.stay.tolist())
-    assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(model.follow[0].tolist())
-    assert layout.spread.tolist() == pytest.approx(model.spread.tolist())
-    assert [0.05, 0.05, 0.05, 0] == pytest.approx(model.restless.tolist())
+    model = model_of(layout.no_moments(1), layout, PRIOR)
+    assert [1 - 1 / MEAN_STAY] * 4 == pytest.approx(model.stay[0].tolist())
+    assert [0, 1 / 3, 1 / 3, 1 / 3, 0] == pytest.approx(model.follow[0, 0].tolist())
+    assert layout.spread.tolist() == pytest.approx(model.spread[0].tolist())
+    assert [0.05, 0.05, 0.05, 0] == pytest.approx(model.restless[0].tolist())
 
 
 def test_transitions_are_counts_by_time_plus_one_prior_event() -> None:
     layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
-    moments = layout.no_moments()
-    moments.time[0], moments.exits[0, 1], moments.exits[0, 3] = 880.0, 6.0, 3.0
-    moments.arrivals[:2], moments.moves[0], moments.rests[0] = (3.0, 7.0), 9.0, 971.0
+    moments = layout.no_moments(1)
+    moments.time[0, 0] = 880.0
+    moments.exits[0, 0, [1, 3]] = 6.0, 3.0
+    moments.arrivals[0, :2] = 3.0, 7.0
+    moments.moves[0, 0] = 9.0
+    moments.rests[0, 0] = 971.0
     model = model_of(moments, layout, PRIOR)
-    assert 1 - 10 / 1000 == pytest.approx(model.stay[0])
+    assert 1 - 10 / 1000 == pytest.approx(model.stay[0, 0])
     entered = np.array([0.25, 6.25, 0.25, 3.25])  # to each room overall, and a quarter each
     expected = (np.array([0, 6, 0, 3]) + np.append(0, entered[1:]) / entered[1:].sum()) / 10
-    assert expected.tolist() == pytest.approx(model.follow[0, :4].tolist())
-    assert [3.5 / 11, 7.5 / 11] == pytest.approx(model.spread[:2].tolist())
-    assert 10 / 1000 == pytest.approx(model.restless[0])
+    assert expected.tolist() == pytest.approx(model.follow[0, 0, :4].tolist())
+    assert [3.5 / 11, 7.5 / 11] == pytest.approx(model.spread[0, :2].tolist())
+    assert 10 / 1000 == pytest.approx(model.restless[0, 0])
 
 
 def bins_of(shown: Any, seen: Any, start: int = 0) -> Evidence:

@@ -223,7 +223,8 @@ class Likelihood(Estimator):
         The sums are those of p, p (1 - p), and 1: float64 (hours, users + 1, width).
         """
         hour = day.minute // 60
-        first = np.concatenate([[0], np.flatnonzero(np.diff(hour)) + 1])
+        begins = hour[1:] != hour[:-1]
+        first = np.concatenate([[0], begins.nonzero()[0] + 1])
         return hour[first], sum_places(places, unknown, self.users, first)
 
     def _whole_day(self, places: PeoplePlaces, day: DayEvidence, unknown: Bool) -> F64:

@@ -17,6 +17,7 @@ from fleet2d.kernels import (
     StayModel,
     Stretches,
     follow_people,
+    learned_stays,
     merge_bins,
     smooth_people,
     watched_views,
@@ -154,45 +155,20 @@ def model_of(moments: Moments, layout: StateLayout, prior: Prior) -> StayModel:
     after 1 / `restless` bins.
 
     Args:
-        moments: What was learned; of several people, with people as the first dimension.
+        moments: What was learned, with people as the first dimension.
         layout: The states.
         prior: What was assumed before.
 
     Returns:
-        The transitions, with as many dimensions.
+        The transitions, likewise.
     """
-    places = layout.rooms + 1
     stages = layout.stages
     lengths = (
         np.linspace(SHORTEST_STAGE, LONGEST_STAGE, stages) if stages > 1 else np.array([MEAN_STAY])
     )
-    ends = moments.exits.sum(axis=-1)
-    stay = 1 - (ends + 1) / (moments.time + np.tile(lengths, places))
-    entered = moments.exits[..., :places].sum(axis=-2) + layout.possible / layout.possible.sum()
-    others = np.repeat(entered[..., None, :], places, axis=-2)
-    others[..., np.arange(places), np.arange(places)] = 0.0
-    others = np.repeat(others / others.sum(axis=-1, keepdims=True), stages, axis=-2)
-    next_stage = np.tile(np.arange(stages) < stages - 1, places) / 2
-    prior_exits = np.empty_like(moments.exits)
-    prior_exits[..., :places] = others * (1 - next_stage)[:, None]
-    prior_exits[..., places] = next_stage
-    follow = (moments.exits + prior_exits) / (ends + 1)[..., None]
-    spread = moments.arrivals + layout.spread
-    spread = spread / _sum_by_room(spread, layout.room)[..., layout.room]
-    trials = moments.moves + moments.rests + 1 / max(prior.restless, 1e-6)
-    restless = (moments.moves + 1) / np.maximum(trials, 1)
-    restless[..., -1] = 0.0  # away has no patches
-    first = np.searchsorted(layout.room, np.arange(places + 1)).astype(np.int64)
-    return StayModel(stay, follow, spread, np.minimum(restless, 1), first, prior.detection)
-
-
-def _sum_by_room(values: F64, room: I64) -> F64:
-    """Return the sums over the patches of each room, in order: (..., patches) to (..., rooms)."""
-    rooms = int(room[-1]) + 1
-    rows = values.reshape(-1, len(room))
-    slot = np.arange(len(rows))[:, None] * rooms + room
-    sums = np.bincount(slot.ravel(), rows.ravel()).astype(np.float64)
-    return sums.reshape(*values.shape[:-1], rooms)
+    first = np.searchsorted(layout.room, np.arange(layout.rooms + 2)).astype(np.int64)
+    learned = learned_stays(moments, lengths, layout.spread, layout.possible, first, prior.restless)
+    return StayModel(*learned, first, prior.detection)
 
 
 @dataclass

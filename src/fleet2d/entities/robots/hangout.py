@@ -267,6 +267,7 @@ class Hangout(BeliefBehavior):
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
         self.rated_by = b""  # the probabilities behind `worth`
         self.worth = -self.penalty
+        self.best = -np.inf  # the largest of `worth`
         self.place: int | None = None
         self.decides_at = actor.clock.start
         self.is_blocked = False  # a person is on its place, or in front of it
@@ -322,7 +323,7 @@ class Hangout(BeliefBehavior):
 
         It spares robots that yield the ways to all places, as they stand elsewhere each time.
         """
-        if self.place is None or worth.max() > worth[self.place] - self.moving + self.hysteresis:
+        if self.place is None or self.best > worth[self.place] - self.moving + self.hysteresis:
             return False
         return plan.reaches(*self.places.points[self.place].tolist())
 
@@ -346,6 +347,7 @@ class Hangout(BeliefBehavior):
                 gain += chance * self.nearness[:, room]
             self.rated_by = probabilities
             self.worth = gain - self.penalty
+            self.best = self.worth.max()
         return self.worth
 
     def _ways(self, actor: Actor) -> F64:
