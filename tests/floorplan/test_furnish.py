@@ -26,6 +26,7 @@ from fleet2d.floorplan.furniture_places import (
 )
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import PRIORITY
 from fleet2d.floorplan.space import BODY_RADIUS, Space
@@ -33,6 +34,11 @@ from fleet2d.runtime.determinism import Draws, stream_key
 
 # Cells of less than this may become a pocket beside furniture: no body's length fits into it.
 POCKET_M2 = 0.1
+
+
+def of_type(plan: FloorPlan, kind: str) -> list[PlacedObject]:
+    """Return the objects of a type."""
+    return [thing for thing in plan.objects if thing.type == kind]
 
 
 def footprints(plan: FloorPlan) -> list[Polygon]:
@@ -165,19 +171,19 @@ def test_room_gets_what_its_type_needs(kind: str, expected: set[str]) -> None:
 
 def test_kitchen_stands_along_one_wall() -> None:
     plan = furnish(one_room("kitchen"))
-    line = [plan.objects_of_type(kind)[0] for kind in ("stove", "sink", "fridge")]
+    line = [of_type(plan, kind)[0] for kind in ("stove", "sink", "fridge")]
 
     assert 1 == len({thing.heading for thing in line})
 
 
 def test_bed_has_its_head_at_a_wall_and_the_tv_faces_the_sofa() -> None:
-    (bed,) = furnish(one_room("bedroom")).objects_of_type("bed")
+    (bed,) = of_type(furnish(one_room("bedroom")), "bed")
     back = np.array(bed.footprint.centroid.coords[0]) - 1.0 * np.array(
         [np.cos(bed.heading), np.sin(bed.heading)]
     )
     assert min(back[0], 5 - back[0], back[1], 4 - back[1]) < 0.2
     plan = furnish(one_room("living_room"))
-    sofa, tv = plan.objects_of_type("sofa")[0], plan.objects_of_type("tv")[0]
+    sofa, tv = of_type(plan, "sofa")[0], of_type(plan, "tv")[0]
     assert pytest.approx(np.pi) == abs(sofa.heading - tv.heading)
 
 
@@ -270,7 +276,7 @@ def test_nothing_stands_before_a_doorway() -> None:
 
 def test_charger_stands_once_in_the_hallway() -> None:
     plan = furnish(load_floorplan())
-    chargers = plan.objects_of_type("charger")
+    chargers = of_type(plan, "charger")
 
     assert 1 == len(chargers)
     at = chargers[0].footprint.centroid

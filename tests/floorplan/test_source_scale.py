@@ -12,10 +12,16 @@ from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.load import load_floorplan
+from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.homes.formats.drawing import Image
 from fleet2d.homes.synthetic.source import Synthetic
+
+
+def of_type(plan: FloorPlan, kind: str) -> list[PlacedObject]:
+    """Return the objects of a type."""
+    return [thing for thing in plan.objects if thing.type == kind]
 
 
 @pytest.mark.parametrize("kind", sorted({name.split()[0] for name in FORMATS}))
@@ -39,7 +45,7 @@ def test_scale_multiplies_lengths_of_every_format(kind: str, tmp_path: Path) -> 
 
 def test_scale_multiplies_everything_in_a_home() -> None:
     usual, doubled = load_floorplan(cell=0.05), load_floorplan(cell=0.1, scale=2)
-    bed, large_bed = usual.objects_of_type("bed")[0], doubled.objects_of_type("bed")[0]
+    bed, large_bed = of_type(usual, "bed")[0], of_type(doubled, "bed")[0]
 
     assert usual.room_of_cell.tolist() == doubled.room_of_cell.tolist()
     assert [2 * door.width_m for door in usual.doorways] == pytest.approx(

@@ -101,8 +101,8 @@ def test_flashlight_stays_within_its_memory_and_gives_the_same_results(
         with monkeypatch.context() as limited:
             limited.setattr(cached_fov, "MEMORY_BYTES", 10_000)
             assert np.array_equal(expected, small.cells(home, *pose, reach))
-        assert small.cache_size[1] <= 10_000
-    assert 1 <= small.cache_size[0] < large.cache_size[0] <= len(set(poses))
+        assert small._bytes <= 10_000
+    assert 1 <= len(small._cache) < len(large._cache) <= len(set(poses))
 
 
 def test_every_method_follows_a_door() -> None:
@@ -162,4 +162,4 @@ def test_flashlight_uses_the_memory_that_it_reports(home: Home) -> None:
     bytes_used, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
 
-    assert bytes_used == pytest.approx(flashlight.cache_size[1], rel=0.15)
+    assert bytes_used == pytest.approx(flashlight._bytes, rel=0.15)

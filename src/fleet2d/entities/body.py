@@ -600,7 +600,7 @@ class Body:
         row, column = cells[draws.below(len(cells))].tolist()
         return self.home.plan.lattice.cell_centre(row, column)
 
-    def find_anywhere(self, place: Any, time_us: int, purpose: str) -> LatticePoint:
+    def find_anywhere(self, place: Any, time_us: int) -> LatticePoint:
         """Return the lattice point of a place to put the body at; no way has to lead there.
 
         Raises:
@@ -613,7 +613,7 @@ class Body:
             for part in range(space.parts):
                 cells = space.cells(rooms[0].index, part)
                 if len(cells):
-                    return self._spot_of(cells, Draws(self.stream(purpose), time_us))
+                    return self._spot_of(cells, Draws(self.stream("put"), time_us))
             raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
         x, y = self.home.plan.lattice.point_at(target)  # type: ignore[arg-type]
         if space.part_at(x, y) < 0:

@@ -403,18 +403,17 @@ class Native(FileSource):
             return plan_of(file, self.path, self.cell, self.scale)
 
 
-def read_native(path: Path, cell: float = 0.05, scale: float | None = None) -> FloorPlan:
+def read_native(path: Path, cell: float = 0.05) -> FloorPlan:
     """Read a floor plan in Fleet2D's own format.
 
     Args:
         path: The file: YAML if its name ends in .yaml or .yml, else JSON.
         cell: Side of a grid cell [m].
-        scale: Metres to a unit of the file; None for 1.
 
     Raises:
         FloorPlanError: It can't be read, isn't in this format, or has no free space.
     """
-    return Native.model_construct(path=path, cell=cell, scale=scale).load()
+    return Native.model_construct(path=path, cell=cell, scale=None).load()
 
 
 def plan_of(file: PlanFile, path: Path, cell: float, scale: float | None = None) -> FloorPlan:

@@ -595,10 +595,6 @@ class FloorPlan:
         """
         return find_named(self.objects, name, self.name, "object")
 
-    def objects_of_type(self, kind: str) -> tuple[PlacedObject, ...]:
-        """Return the objects of a type, such as `bed`."""
-        return tuple(thing for thing in self.objects if thing.type == kind)
-
     def objects_in(self, room: Room) -> tuple[PlacedObject, ...]:
         """Return the objects whose middle is in a room."""
         middles = [(thing, thing.footprint.centroid) for thing in self.objects]

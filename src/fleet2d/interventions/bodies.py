@@ -107,7 +107,7 @@ class Put(BodyIntervention):
         item = None if is_point(self.to) else furniture_of(actor, self.to)
         if item is not None:
             return actor.place_at(item, 0).approach
-        return actor.find_anywhere(self.to, world.step * world.clock.step_us, "put")
+        return actor.find_anywhere(self.to, world.step * world.clock.step_us)
 
 
 class Send(BodyIntervention):

@@ -60,19 +60,18 @@ class UnknownPlaces:
         return is_unknown
 
 
-def log_loss(probability: F64, truth: I64, floor: float = MIN_PROBABILITY) -> F64:
-    """Return -ln max(p(truth), floor) of each forecast [nats]; strictly proper but for the clip.
+def log_loss(probability: F64, truth: I64) -> F64:
+    """Return -ln max(p(truth), 1e-6) of each forecast [nats]; strictly proper but for the clip.
 
     Args:
         probability: float64 (n, places), rows sum to one.
         truth: int64 (n,), the true place.
-        floor: Smaller probabilities are raised to this.
 
     Example:
         >>> log_loss(np.array([[0.5, 0.5], [1.0, 0.0]]), np.array([0, 1])).round(3).tolist()
         [0.693, 13.816]
     """
-    return -natural_log(np.maximum(_of(probability, truth), floor))
+    return -natural_log(np.maximum(_of(probability, truth), MIN_PROBABILITY))
 
 
 def brier_score(probability: F64, truth: I64) -> F64:

@@ -137,11 +137,6 @@ class Flashlight(FieldOfView):
         part[:] = box.reshape(cells.rows, cells.columns)
         return mask
 
-    @property
-    def cache_size(self) -> tuple[int, int]:
-        """The number of cached poses, and their memory [bytes]."""
-        return len(self._cache), self._bytes
-
     def _lookup(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> CellBits:
         if getattr(self, "_walls", None) is not home.walls:
             self.start(home)

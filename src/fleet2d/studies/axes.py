@@ -191,13 +191,13 @@ class Parameter(Settings):
         return f"{value!r} {self.unit}" if self.unit and not self.choices else value
 
 
-def rounded(value: float, digits: int = DIGITS) -> float:
-    """Return a number rounded to a number of significant digits.
+def rounded(value: float) -> float:
+    """Return a number rounded to six significant digits.
 
     >>> rounded(0.123456789)
     0.123457
     """
-    return float(f"{value:.{digits}g}")
+    return float(f"{value:.{DIGITS}g}")
 
 
 def shares(method: Method, count: int, dimensions: int, seed: int) -> F64:

@@ -213,20 +213,20 @@ class LiveRun:
         serve: Serves the run when it is over, and returns its number.
     """
 
-    def __init__(self, simulation: Simulation, *, paused: bool = False, speed: float = 0.0) -> None:
+    def __init__(self, simulation: Simulation, *, paused: bool = False) -> None:
         """Prepare the thread; `start` starts it.
 
         Args:
             simulation: The simulation.
             paused: Whether it waits for the page to resume it.
-            speed: Simulated time over wall time; 0: as fast as possible.
         """
         self.engine = LiveEngine(simulation)
         self.run: Run | None = None
         self.failure: BaseException | None = None
         self.serve: Callable[[Run], int] = lambda _: -1
         self._clock = simulation.clock
-        self._paused, self._speed = paused, speed
+        self._paused = paused
+        self._speed = 0.0  # simulated time over wall time; 0: as fast as it goes
         self._achieved = 0.0
         self._orders: queue.Queue[tuple[LiveOrder, queue.Queue[str]]] = queue.Queue()
         self._watchers: list[queue.Queue[LiveFrame]] = []

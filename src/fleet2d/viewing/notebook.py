@@ -123,8 +123,8 @@ def run_html(run: Run) -> str:
     return f"<div><b>{title}</b>{verdict_html(run)}<p>{text}</p>{picture}</div>"
 
 
-def figure_png(figure: Any, dpi: float | str = NOTEBOOK_DPI) -> bytes:
+def figure_png(figure: Any) -> bytes:
     """Return a figure as a PNG, without the version of matplotlib."""
     picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=dpi, metadata={"Software": None})
+    figure.savefig(picture, format="png", dpi=NOTEBOOK_DPI, metadata={"Software": None})
     return picture.getvalue()

@@ -88,7 +88,7 @@ def read_detections(path: Path) -> DetectionLog:
     log = DetectionLog(
         path,
         _numbers(table, "distance", 0, MAX_METRES, f"a distance from 0 to {MAX_METRES:g} m"),
-        _flags(table, "detected"),
+        _detected(table),
         _angle(table, "bearing"),
         _angle(table, "orientation"),
         _names(table, "true_identity") if has_identity else None,
@@ -120,11 +120,11 @@ def _numbers(table: LogTable, name: str, low: float, high: float, expected: str)
     return values
 
 
-def _flags(table: LogTable, name: str) -> Bool:
-    """Return a column of yes and no."""
-    texts = table.texts(name).to_pylist()
+def _detected(table: LogTable) -> Bool:
+    """Return whether the person of each row was noticed."""
+    texts = table.texts("detected").to_pylist()
     values = np.array([FLAGS.get((text or "").lower(), math.nan) for text in texts])
-    _refuse(table, name, np.isnan(values), "0 or 1")
+    _refuse(table, "detected", np.isnan(values), "0 or 1")
     return values > 0
 
 
