@@ -55,9 +55,10 @@ def log_lines(path: Path) -> Iterator[tuple[int, str]]:
     """
     with os_errors_as(LogError, f"{path} can't be read"):
         check_file(path, LOG_BYTES, LogError)
+        most = LOG_ROWS.limit
         with TextIOWrapper(open_input(path, LogError), encoding_of(path), "replace") as lines:
             for number, text in enumerate(iter(lambda: lines.readline(_LONGEST), ""), 1):
-                if number > LOG_ROWS.limit:
+                if number > most:
                     LOG_ROWS.check(number, path, LogError, prefix="more than ")
                 if len(text) == _LONGEST:
                     raise LogError(
