@@ -67,10 +67,13 @@ def test_help_lists_the_commands_in_groups_the_most_used_first(fleet2d: Cli) -> 
 
 
 @pytest.mark.parametrize("words", [(), ("study",), ("fit",), ("dataset",)])
-def test_no_description_of_a_command_is_cut_or_wrapped(words: tuple[str, ...]) -> None:
-    done = process("-m", "fleet2d", *words, "--help", COLUMNS="80")
+def test_no_description_of_a_command_is_cut_or_wrapped(
+    words: tuple[str, ...], fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = fleet2d(*words, "--help")
 
-    sections = described(done.stdout)
+    sections = described(out)
     for heading in GROUPS if not words else ("Commands",):
         for line in sections[heading]:
             name, description = line.split(maxsplit=1)
@@ -79,10 +82,13 @@ def test_no_description_of_a_command_is_cut_or_wrapped(words: tuple[str, ...]) -
             assert len(description) <= 58, name
 
 
-def test_descriptions_are_wrapped_in_a_narrow_terminal() -> None:
-    done = process("-m", "fleet2d", "--help", COLUMNS="50")
+def test_descriptions_are_wrapped_in_a_narrow_terminal(
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "50")
+    _, out, _ = fleet2d("--help")
 
-    commands = done.stdout.partition("Run:")[2].partition("Examples:")[0]
+    commands = out.partition("Run:")[2].partition("Examples:")[0]
     assert max(map(len, commands.splitlines())) <= 50
     assert "..." not in commands
     assert "Simulate a scenario and store the run." in " ".join(commands.split())
@@ -170,23 +176,27 @@ def test_command_imports_no_other() -> None:
     assert "fleet2d.cli.results fleet2d.cli.run" == done.stdout.splitlines()[-1]
 
 
-def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(tmp_path: Path) -> None:
+def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
     words = ("bundled:family", "simulation.duration=3 h", "simulation.start=2026-01-05T17:00")
     tables = []
     for columns in ("20", "200"):
-        out = str(tmp_path / columns)
-        done = process("-m", "fleet2d", "run", *words, "--out", out, COLUMNS=columns)
-        lines = [line.split() for line in done.stdout.splitlines()]
+        monkeypatch.setenv("COLUMNS", columns)
+        _, out, _ = fleet2d("run", *words, "--seed", "1", "--out", columns)
+        lines = [line.split() for line in out.splitlines()]
         tables.append([line for line in lines if line[:1] != ["stored"] and " x " not in str(line)])
     narrow, wide = ([line for line in table if "real" not in line] for table in tables)
     assert narrow == wide
 
 
-def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(tmp_path: Path) -> None:
-    words = ("bundled:paper", "simulation.duration=1 d")
-    done = process("-m", "fleet2d", "run", *words, "--out", str(tmp_path / "run"), COLUMNS="40")
+def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(
+    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    _, out, _ = fleet2d("run", "bundled:paper", "simulation.duration=1 d", "--out", "run")
 
-    assert "share of time at home" in " ".join(done.stdout.split())
+    assert "share of time at home" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(

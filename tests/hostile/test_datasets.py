@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.hostile.test_folders import attack, state_of
-from tests.learning.datasets.small import make
+from tests.learning.datasets.small import made, make
 
 from fleet2d.learning.datasets.reader import open_dataset
 from fleet2d.learning.datasets.tables import SCHEMAS
@@ -23,8 +23,8 @@ MANIFEST = "dataset.json"
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root: Path = make(tmp_path_factory.mktemp("data") / "small").root
+def whole() -> Path:
+    root: Path = made().root
     return root
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ OTHER_WORDS = {
     EventKind.QUESTION, EventKind.REPLAY, EventKind.SENSOR, EventKind.SHUT, EventKind.UNKNOWN,
     EventKind.USES, EventKind.VISITS,
 }  # fmt: skip
+QUOTED = re.compile("|".join(f'"{kind}"' for kind in events.KINDS))
 # Functions that take a kind, and attributes that hold some.
 TAKES_KIND = {
     "Event", "Note", "SightEvent", "emit", "events", "interrupt_on", "new_event", "new_note",
@@ -79,6 +81,8 @@ def test_other_words_are_no_kinds(source: str) -> None:
 
 def bare_kinds(source: str) -> Iterator[tuple[int, str]]:
     """Yield the line and the text of each string that is a kind of event."""
+    if not QUOTED.search(source):
+        return
     tree = ast.parse(source)
     in_place = {id(node) for place in ast.walk(tree) for node in kinds_in(place)}
     for node in ast.walk(tree):

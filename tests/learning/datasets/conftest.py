@@ -1,12 +1,12 @@
 """A small data set that the tests share."""
 
 import pytest
-from tests.learning.datasets.small import make
+from tests.learning.datasets.small import made
 
 from fleet2d.learning.datasets.reader import Dataset
 
 
 @pytest.fixture(scope="session")
-def data(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+def data() -> Dataset:
     """A small data set, made once."""
-    return make(tmp_path_factory.mktemp("data") / "small")
+    return made()

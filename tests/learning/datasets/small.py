@@ -1,5 +1,8 @@
 """A small data set: two homes to train on, one to test on, and six hours of each."""
 
+import atexit
+import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,3 +35,11 @@ def make(folder: Path, workers: int = 1) -> Any:
     import fleet2d
 
     return fleet2d.dataset(SOURCE, folder, workers=workers)
+
+
+@cache
+def made() -> Any:
+    """Make it once for all tests of this process, which change copies of it only."""
+    folder = tempfile.TemporaryDirectory(prefix="fleet2d-small-")
+    atexit.register(folder.cleanup)
+    return make(Path(folder.name) / "small")

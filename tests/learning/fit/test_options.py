@@ -5,10 +5,18 @@ from pathlib import Path
 
 import pytest
 
+from fleet2d.learning.fit import validation
 from fleet2d.learning.fit.command import fit_routine
 from fleet2d.learning.fit.timeline import kinds_of, read_timeline
 from fleet2d.logs.layout import read_log
 from fleet2d.logs.log import ActivityLog, LogError
+
+
+@pytest.fixture(autouse=True)
+def _few_days_are_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How well days fit, which takes long to tell, is no matter here."""
+    for name in ("SAMPLED", "CHAIN_DAYS", "SAMPLED_BY_SECOND", "CHAIN_DAYS_BY_SECOND"):
+        monkeypatch.setattr(validation, name, 7)
 
 
 def events(path: Path) -> ActivityLog:
