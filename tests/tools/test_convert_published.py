@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from tools.convert_published import convert_file, main
 
 import fleet2d
@@ -97,7 +98,9 @@ robot:
         ang_speed: 15
     color: red
 """
-USER1 = OLD[OLD.index("  user1:") : OLD.index("robot:")]
+CASES: list[dict[str, Any]] = yaml.safe_load(
+    (Path(__file__).parent / "converted.yaml").read_text(encoding="utf-8")
+)
 WALKS = ("users.user0.base", "users.user1.base", "robot.base")
 USUAL = [
     "floorplan.he.ppm: the grid's cells are 0.05 m; walls and poses are not rounded to them",
@@ -139,11 +142,6 @@ def written(folder: Path, *changes: tuple[str, str], text: str = OLD) -> Path:
 def converted(folder: Path, *changes: tuple[str, str]) -> tuple[list[str], Scenario]:
     remarks = convert_file(written(folder, *changes), folder / "new.yaml")
     return remarks, load_scenario(folder / "new.yaml")
-
-
-def extra(folder: Path, *changes: tuple[str, str]) -> list[str]:
-    """Return the remarks that the unchanged configuration doesn't get."""
-    return [remark for remark in converted(folder, *changes)[0] if remark not in USUAL]
 
 
 def refused(folder: Path, *changes: tuple[str, str], text: str = OLD) -> str:
@@ -259,68 +257,24 @@ def test_walk_of_one_step_is_a_tenth_of_a_metre_and_turns_fifteen_degrees(folder
     assert 15 == pytest.approx(std, rel=0.15)
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("days: 30\n    hours: 2", timedelta(days=30, hours=2)),
-        ("weeks: 1\n    minutes: 1.5\n    seconds: 1", timedelta(weeks=1, seconds=91)),
-        ("days: 1\n    hours: -1", timedelta(hours=23)),
-    ],
-)
-def test_duration_adds_up_its_units(folder: Path, old: str, new: timedelta) -> None:
-    _, scenario = converted(folder, ("hours: 2\n    days: 0", old))
-    assert new == scenario.simulation.duration
-
-
-def test_duration_no_multiple_of_the_step_is_remarked(folder: Path) -> None:
-    assert [
-        "simulation.duration: 2 h is not a multiple of delta, 7 s: there, a run went one step beyond"
-        " it; here it ends with the last full step within it"
-    ] == [r for r in extra(folder, ("seconds: 1", "seconds: 7")) if "duration" in r]
-
-
-def test_start_with_a_time_zone_keeps_the_clock_and_is_remarked(folder: Path) -> None:
-    remarks, scenario = converted(folder, ("'2010-11-17 13:12:11'", "'2010-11-17 13:12:11+02:00'"))
-    assert datetime(2010, 11, 17, 13, 12, 11) == scenario.simulation.start
-    assert (
-        "simulation.start_ts: its time zone is left out: time is that of the clock on the"
-        " home's wall" in remarks
-    )
-
-
-@pytest.mark.parametrize("stamp", ["2010-11-17", "!!timestamp 2010-11-17", "'2010-11-17'"])
-def test_start_without_a_time_is_midnight(folder: Path, stamp: str) -> None:
-    _, scenario = converted(folder, ("!!timestamp '2010-11-17 13:12:11'", stamp))
-    assert datetime(2010, 11, 17) == scenario.simulation.start
-
-
-def test_seed_null_stays_null_without_remark(folder: Path) -> None:
-    remarks, scenario = converted(folder, ("seed: 4", "seed: null"))
-    assert scenario.simulation.seed is None
-    assert not [remark for remark in remarks if "seed" in remark]
-
-
-def test_speedup_is_kept_and_remarked(folder: Path) -> None:
-    remarks, scenario = converted(folder, ("speedup: null", "speedup: 10"))
-    assert 10 == scenario.simulation.speedup
-    assert (
-        "simulation.speedup: kept to in full here; there, each step slept for its share of it on"
-        " top of computing"
-    ) in remarks
-
-
-@pytest.mark.parametrize("true", ["True", "true", "yes", "on"])
-def test_visualization_is_left_out(folder: Path, true: str) -> None:
-    assert [
-        "simulation.visualization.visualize, simulation.visualization.every_n_steps: left out: no"
-        " window opens during a run; `fleet2d show RUN_DIR` draws a stored one"
-    ] == extra(folder, ("visualize: False", f"visualize: {true}"))
-
-
-def test_flashlight_is_kept_as_the_method_of_sight(folder: Path) -> None:
-    change = ("show_progress: True", "show_progress: True\n  fov_provider: Flashlight")
-    _, scenario = converted(folder, change)
-    assert "flashlight" == scenario.sight.model_dump()["method"]["type"]
+@pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
+def test_change_of_the_configuration_changes_the_scenario(
+    folder: Path, case: dict[str, Any]
+) -> None:
+    every_remark, _ = converted(folder, *case["change"].items())
+    remarks = [
+        remark.replace(str(folder), "home") for remark in every_remark if remark not in USUAL
+    ]
+    for key, value in case.get("becomes", {}).items():
+        part = yaml.safe_load((folder / "new.yaml").read_text())
+        for name in key.split("."):
+            part = (part or {}).get(name)
+        assert value == part, key
+    if "among" in case:
+        assert set(case["among"]) <= set(remarks)
+    else:
+        assert case.get("remarks", []) == remarks
+    assert not any(case.get("lacks", "\0") in remark for remark in every_remark)
 
 
 def test_walks_stay_at_walls_as_there(folder: Path) -> None:
@@ -328,19 +282,6 @@ def test_walks_stay_at_walls_as_there(folder: Path) -> None:
     bodies = [*scenario.users.values(), *scenario.robots.values()]
     walks = [behavior for body in bodies for behavior in body.behaviors]
     assert {"stay"} == {walk.at_walls for walk in walks}
-
-
-def test_progress_and_provider_and_prefix_are_left_out(folder: Path) -> None:
-    assert [
-        "simulation.show_progress: left out: `fleet2d run --quiet` shows none",
-        "simulation.fov_provider: left out: lines of sight are computed exactly here",
-        "simulation.outputs.output_dir, simulation.outputs.prefix: left out: `fleet2d run --out"
-        " DIR` says where a run is stored",
-    ] == extra(
-        folder,
-        ("show_progress: True", "show_progress: False\n  fov_provider: Rays"),
-        ("prefix: null", "prefix: mine"),
-    )
 
 
 def test_save_false_stores_nothing(folder: Path) -> None:
@@ -353,12 +294,6 @@ def test_save_false_stores_nothing(folder: Path) -> None:
         " manifest"
     ) in remarks
     assert [] == list(fleet2d.run(scenario, "simulation.duration=1 min").tables)
-
-
-def test_save_every_step(folder: Path) -> None:
-    remarks, scenario = converted(folder, ("every_n_steps: 600", "every_n_steps: 1"))
-    assert "every step" == scenario.artifacts.trajectories
-    assert any("poses are stored every step, observations" in remark for remark in remarks)
 
 
 def test_path_counts_from_the_top_of_a_repository_above_the_file(folder: Path) -> None:
@@ -396,49 +331,6 @@ def test_path_of_no_file_is_kept_and_remarked(folder: Path) -> None:
     assert 7200 == load_scenario(folder / "new.yaml").simulation.steps
 
 
-@pytest.mark.parametrize(("ppm", "cell"), [("50", 0.02), ("30", 0.0333333333333), ("1000", 0.01)])
-def test_ppm_becomes_the_cell_within_its_limits(folder: Path, ppm: str, cell: float) -> None:
-    remarks, scenario = converted(folder, ("ppm: 20", f"ppm: {ppm}"))
-    assert cell == plan_of(scenario)[2]
-    assert (
-        f"floorplan.he.ppm: the grid's cells are {cell:.4g} m; walls and poses are not"
-        " rounded to them" in remarks
-    )
-
-
-def test_names_as_a_list_or_with_blanks(folder: Path) -> None:
-    for names in ("[user0, user1]", "' user0 , user1,'"):
-        (folder / "new.yaml").unlink(missing_ok=True)
-        _, scenario = converted(folder, ('"user0,user1"', names))
-        assert ["user0", "user1"] == list(scenario.users)
-
-
-def test_section_that_nobody_names_is_left_out(folder: Path) -> None:
-    remarks, scenario = converted(folder, ('"user0,user1"', '"user0"'))
-    assert ["user0"] == list(scenario.users)
-    assert "users.user1: left out: users.names doesn't have it, so it was not used" in remarks
-    assert not [remark for remark in remarks if "user1.base" in remark]
-
-
-def test_no_users(folder: Path) -> None:
-    remarks, scenario = converted(folder, ('"user0,user1"', '""'))
-    assert {} == scenario.users
-    assert "users.names: no names; the scenario has no users" in remarks
-
-
-def test_names_that_are_none_here_are_changed_and_remarked(folder: Path) -> None:
-    remarks, scenario = converted(
-        folder,
-        ('"user0,user1"', '"Ana Maria,robot"'),
-        ("  user0:", "  Ana Maria:"),
-        ("  user1:", "  robot:"),
-    )
-    assert ["Ana_Maria", "robot"] == list(scenario.users)
-    assert ["robot_2"] == list(scenario.robots)
-    assert "users.Ana Maria: called Ana_Maria: names are letters, digits, _ and -" in remarks
-    assert "robot: called robot_2: there is a user robot" in remarks
-
-
 def test_start_in_a_wall_moves_to_the_nearest_free_point(folder: Path) -> None:
     remarks, scenario = converted(folder, ("x: 8.0", "x: -3.0"))
     (moved,) = [remark for remark in remarks if remark not in USUAL]
@@ -459,40 +351,6 @@ def test_start_is_moved_for_a_body_too_wide_for_it(folder: Path) -> None:
     ]
 
 
-def test_ranges_that_were_ignored_take_effect_and_are_remarked(folder: Path) -> None:
-    remarks, scenario = converted(
-        folder, ("distance: 3.0", "distance: 3.0\n      min_distance: 1.0\n      max_distance: 4.5")
-    )
-    camera = scenario.robots["robot"].camera
-    assert camera is not None
-    assert (1.0, 4.5) == camera.range
-    assert [
-        "robot.base.fov_config.min_distance, robot.base.fov_config.max_distance: accepted and"
-        " ignored there, where it saw from 0 to distance, 3 m; here they hold, and camera.range"
-        " is [1, 4.5]"
-    ] == [remark for remark in remarks if remark not in USUAL]
-
-
-def test_a_flashlight_sees_as_far_as_there(folder: Path) -> None:
-    remarks, scenario = converted(
-        folder,
-        ("distance: 3.0", "distance: 3.0\n      min_distance: 1.0\n      max_distance: 4.5"),
-        ("show_progress: True", "show_progress: True\n  fov_provider: Flashlight"),
-    )
-    camera = scenario.robots["robot"].camera
-    assert camera is not None
-    assert (0.0, 3.0) == camera.range
-    (remark,) = (remark for remark in remarks if "min_distance" in remark)
-    assert "left out, as they were ignored there: it sees from 0 to distance, 3 m" in remark
-    assert "camera.range: [1, 4.5]" in remark
-
-
-def test_angle_beyond_a_turn_sees_all_round(folder: Path) -> None:
-    camera = converted(folder, ("angle: 108", "angle: 400"))[1].robots["robot"].camera
-    assert camera is not None
-    assert 360 == camera.angle_deg
-
-
 def test_no_stride_stands_still(folder: Path) -> None:
     remarks, scenario = converted(folder, ("lin_speed: 0.1", "lin_speed: 0"))
     assert (
@@ -503,25 +361,6 @@ def test_no_stride_stands_still(folder: Path) -> None:
     before = simulation.state["user0"]
     simulation.advance(1000)
     assert before == simulation.state["user0"]
-
-
-def test_no_turns_walks_straight(folder: Path) -> None:
-    remarks, scenario = converted(folder, ("ang_speed: 15", "ang_speed: 0"))
-    assert 0 == walk(scenario.users["user0"]).turn_std_deg
-    assert not any("user0" in remark for remark in remarks if "ang_speed" in remark)
-
-
-def test_turns_beyond_the_fastest_are_remarked(folder: Path) -> None:
-    remarks, scenario = converted(
-        folder,
-        ("seconds: 1\n    minutes: 0", "milliseconds: 10"),
-        ("ang_speed: 15", "ang_speed: 90"),
-    )
-    assert 36000 == scenario.users["user0"].turn_rate_deg
-    assert (
-        "users.user0.base.pose_config.meander_strategy.ang_speed: turns are cut at 36000 deg/s,"
-        " the fastest there is"
-    ) in remarks
 
 
 def test_missing_parts_get_what_the_remarks_say(folder: Path) -> None:
@@ -569,25 +408,6 @@ def test_no_robot(folder: Path) -> None:
     remarks = convert_file(folder / "old.yaml", folder / "new.yaml")
     assert "robot: missing; the scenario has no robot" in remarks
     assert {} == load_scenario(folder / "new.yaml").robots
-
-
-def test_type_of_ones_own_is_read_as_base(folder: Path) -> None:
-    remarks, scenario = converted(folder, ("type: base\n    base:", "type: cat\n    cat:"))
-    assert 0.2 == scenario.users["user0"].radius
-    assert "users.user0.type: cat is not a type of the published Fleet2D: read as base" in remarks
-
-
-def test_unknown_keys_are_left_out_with_their_lines(folder: Path) -> None:
-    assert [
-        f"simulation.speed_up: not known, left out ({folder / 'old.yaml'}:10)",
-        f"users.user0.base.mood: not known, left out ({folder / 'old.yaml'}:34)",
-        f"weather: not known, left out ({folder / 'old.yaml'}:77)",
-    ] == extra(
-        folder,
-        ("  seed: 4", "  speed_up: 3\n  seed: 4"),
-        ("      radius: 0.2", "      mood: {is: good, was: bad}\n      radius: 0.2"),
-        ("    color: red\n", "    color: red\nweather: rain\n"),
-    )
 
 
 # Refusals
