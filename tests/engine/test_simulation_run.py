@@ -27,13 +27,6 @@ def test_a_stored_run_is_reproduced(stored: Path) -> None:
     assert fleet2d.open_run(stored).digest == result.digest
 
 
-def test_a_run_whose_seed_was_drawn_is_reproduced(tmp_path: Path) -> None:
-    content = scenario(users={"ana": {"type": "meander"}})
-    del content["simulation"]["seed"]
-    fleet2d.run(content, out=tmp_path / "run")
-    assert fleet2d.reproduce(tmp_path / "run").same
-
-
 def test_the_order_of_keys_is_kept_for_who_repeats_a_run(tmp_path: Path) -> None:
     """Manifests had sorted keys: people who weren't listed by name lived another life."""
     shares = {"kitchen": 0.3, "bedroom": 0.3, "away": 0.2, "bathroom": 0.2}

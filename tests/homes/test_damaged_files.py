@@ -163,9 +163,9 @@ def test_rubbish_is_refused_in_a_few_words(tmp_path: Path, kind: str, rubbish: s
 def test_missing_file_and_folder_are_refused(tmp_path: Path, kind: str) -> None:
     name, _, read = FORMATS[kind]
 
-    assert "there is no file" in refusal(read, tmp_path / name)
+    assert ": check floorplan.path" in refusal(read, tmp_path / name)
     (tmp_path / name).mkdir()
-    assert "is a folder" in refusal(read, tmp_path / name)
+    assert "is a folder: name the floor plan's file in it" in refusal(read, tmp_path / name)
 
 
 # --- Outlines that are none -------------------------------------------------------------------------

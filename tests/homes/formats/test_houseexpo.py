@@ -222,14 +222,6 @@ def test_labels_of_658e(plans: list[Path]) -> None:
     assert (331, 202) == (plan.lattice.columns, plan.lattice.rows)
 
 
-def test_plan_without_categories_is_one_unknown_room(plans: list[Path]) -> None:
-    """Known failure 6: a plan without labels crashed."""
-    plan = read(plans, "13f8a2df")
-
-    assert ["unknown_1"] == [room.name for room in plan.rooms]
-    assert (404, 804) == (plan.lattice.columns, plan.lattice.rows)
-
-
 @pytest.mark.slow
 def test_plan_that_touches_itself_is_read_with_a_note(plans: list[Path]) -> None:
     plan = read(plans, "69c2ebf7")
@@ -380,13 +372,6 @@ def test_file_that_is_not_json_is_refused(tmp_path: Path, content: bytes, messag
 
     with pytest.raises(FloorPlanError, match=message):
         read_houseexpo(path)
-
-
-def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FloorPlanError, match=r"there is no file .*: check floorplan\.path"):
-        read_houseexpo(tmp_path / "nowhere.json")
-    with pytest.raises(FloorPlanError, match="is a folder: name the floor plan's file in it"):
-        read_houseexpo(tmp_path)
 
 
 def test_text_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:

@@ -500,11 +500,6 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -
     assert message in refusal(path)
 
 
-def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
-    assert "there is no file" in refusal(tmp_path / "none.yaml")
-    assert "is a folder" in refusal(tmp_path)
-
-
 def test_map_too_large_for_the_cells_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, np.pad(np.full((18, 17_000), FREE, np.uint8), 1))
 

@@ -598,13 +598,6 @@ def test_damaged_map_is_refused(tmp_path: Path, changes: dict[str, Any], message
     assert message in refusal(tmp_path, vacuum_map(**changes))
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5, 0.99])
-def test_truncated_file_is_refused(tmp_path: Path, share: float) -> None:
-    text = json.dumps(vacuum_map())
-
-    assert "is not JSON" in refusal(tmp_path, text[: int(share * len(text))])
-
-
 def test_noise_is_refused_quickly(tmp_path: Path) -> None:
     chequered = [n for y in range(300) for x in range(y % 2, 300, 2) for n in (x, y, 1)]
 
