@@ -161,6 +161,7 @@ def test_errors_under_each_policy_are_bars_as_policies_have_no_order() -> None:
     assert axes.get_ylim()[1] < 0.5  # as large as they allow
 
 
+@pytest.mark.slow
 def test_a_result_is_the_same_again(measured: dict[str, Result], tmp_path: Path) -> None:
     again = ltp_gap(replace(TINY, seeds=2, folder=tmp_path))
     assert numbers_of(measured["ltp-gap"]) == numbers_of(again)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.scenes import TESTS, digests, everything, flat_path, run, scenario, table
+from tests.thorough import some
 
 import fleet2d
 from fleet2d import Behavior
@@ -122,7 +123,7 @@ def test_run_by_flashlight_is_nearly_the_same_where_users_walk() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("span", [1, 50])
+@pytest.mark.parametrize("span", some([50, 1], 2))
 def test_spans_do_not_show_in_a_run_by_another_method(span: int) -> None:
     content = {**with_odd_cameras(), "sight": {"method": {"type": "flashlight"}}}
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from tests.change_nights import CHANGED_RULES, MINUTE, ZONES, Night, nights
+from tests.thorough import some
 
 import fleet2d
 
@@ -54,7 +55,7 @@ def due(night: Night) -> list[tuple[int, int]]:
     return [(step, k) for step, _, k in sorted(steps) if step > 0]
 
 
-@pytest.mark.parametrize("night", NIGHTS, ids=str)
+@pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
 def test_schedule_door_log_and_expectation_are_in_local_time(night: Night, tmp_path: Path) -> None:
     """Over forty time zones, and some in the year in which their rules changed."""
     log = tmp_path / "log.csv"

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tests.scenes import AGENDA, OWN, digests, run, scenario, table
+from tests.thorough import some
 
 import fleet2d
 from fleet2d.errors import InputError, RunDirectoryError, ScenarioError
@@ -233,7 +234,7 @@ def test_metrics_are_judged_by_the_whole_run_at_its_end() -> None:
     assert stored.metrics["distance"]["ben"] - 1 == verdicts["ends"].robustness
 
 
-@pytest.mark.parametrize("max_span", [1, 7])
+@pytest.mark.parametrize("max_span", some([7, 1], 2))
 def test_spans_are_invisible(max_span: int) -> None:
     (whole, verdicts), (cut, again) = finished(None), finished(max_span)
 

@@ -8,6 +8,7 @@ import pytest
 import shapely
 from tests.engine.test_cameras_hiding import WALK, seen
 from tests.scenes import digests, run, scenario
+from tests.thorough import some
 
 import fleet2d
 from fleet2d.engine.heights import prisms_of
@@ -151,7 +152,7 @@ def walkers() -> dict[str, Any]:
     return content
 
 
-@pytest.mark.parametrize("span", [1, 37])
+@pytest.mark.parametrize("span", some([37, 1], 2))
 def test_spans_do_not_show_where_heights_matter(span: int) -> None:
     content = walkers()
 

@@ -12,6 +12,7 @@ import pytest
 from tests.meshed_homes import walls_of
 from tests.reference import visible_cells as slow
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
+from tests.thorough import some
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, History, Home, Metric, Present
@@ -154,7 +155,7 @@ def test_exposure_is_what_brute_force_counts_and_costs_nothing_else() -> None:
     assert [] == layer_names(stored)  # nobody asked for them to be stored
 
 
-@pytest.mark.parametrize("span", [1, 7, 100])
+@pytest.mark.parametrize("span", some([7, 1, 100], 3))
 def test_layers_are_the_same_for_every_max_span(span: int) -> None:
     content = everything("20 min")
     content["floorplan"] = {

@@ -8,6 +8,7 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pytest
 from tests.change_nights import CHANGED_RULES, DAY, MINUTE, ZONES, Night, nights
+from tests.thorough import some
 
 from fleet2d.entities.behavior import parse_span
 from fleet2d.expectations.expectation import RunSignals
@@ -44,7 +45,7 @@ def test_forty_zones_are_compared() -> None:
     assert len(NIGHTS) > 60
 
 
-@pytest.mark.parametrize("night", NIGHTS, ids=str)
+@pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
 def test_clock_reads_as_the_standard_library_each_minute(night: Night) -> None:
     """Fields, offset and fold; texts, readings and stamps of tables; and each moment of a reading."""
     clock = clock_of(night)
@@ -60,7 +61,7 @@ def test_clock_reads_as_the_standard_library_each_minute(night: Night) -> None:
     assert [clock.elapsed(moment) for moment in moments] == (steps * clock.step_us).tolist()
 
 
-@pytest.mark.parametrize("night", NIGHTS, ids=str)
+@pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
 def test_written_time_is_the_first_minute_that_reads_so_or_later_after_a_gap(night: Night) -> None:
     """Each minute of the local night that one may write, by a search through the real ones."""
     clock = clock_of(night)
@@ -79,7 +80,7 @@ def test_written_time_is_the_first_minute_that_reads_so_or_later_after_a_gap(nig
         assert step == at[wanted], first + ahead * MINUTE
 
 
-@pytest.mark.parametrize("night", NIGHTS, ids=str)
+@pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
 def test_hours_hold_while_the_clock_reads_a_time_within_them(night: Night) -> None:
     """Of behaviors and expectations, with their ends and the next begin."""
     clock = clock_of(night)
@@ -111,7 +112,7 @@ def test_hours_hold_while_the_clock_reads_a_time_within_them(night: Night) -> No
         assert trace.values(np.arange(MINUTES)).tolist() == [float(each) for each in inside]
 
 
-@pytest.mark.parametrize("night", NIGHTS, ids=str)
+@pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
 def test_hours_days_and_weeks_of_expectations_begin_by_the_clock(night: Night) -> None:
     """A day that is begun again, as a clock is put back, is the same one; an hour is another."""
     clock = clock_of(night)
@@ -133,7 +134,7 @@ def test_hours_days_and_weeks_of_expectations_begin_by_the_clock(night: Night) -
         assert _period_begins(RunSignals({}, {}, 0, MINUTES, True, clock), per) == expected, per
 
 
-@pytest.mark.parametrize("night", NIGHTS, ids=str)
+@pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
 def test_daily_time_of_a_script_is_once_a_day(night: Night) -> None:
     """Also at a time that doesn't exist, or exists twice: then it is the first of both."""
     clock = clock_of(night, 3 * MINUTES)

@@ -63,6 +63,7 @@ SCENARIO = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the fonts of this machine")
 def test_run_of_names_in_any_script_is_stored_reproduced_and_exported(
     fleet2d: Cli, tmp_path: Path

@@ -119,6 +119,7 @@ def test_a_script_needs_no_guard_around_its_main_code(tmp_path: Path) -> None:
     assert ("[3, 5]\n", 0) == (process.stdout, process.returncode), process.stderr
 
 
+@pytest.mark.slow
 def test_a_worker_that_holds_too_much_memory_is_replaced() -> None:
     with LocalExecutor(1, memory_mb=1.0) as executor:
         assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)

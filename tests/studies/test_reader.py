@@ -51,6 +51,7 @@ def test_opening_loads_neither_the_simulator_nor_pandas(study: Study) -> None:
     assert "[]\n" == done.stdout
 
 
+@pytest.mark.slow
 def test_running_does_not_load_pandas(tmp_path: Path) -> None:
     code = (
         "import sys, fleet2d\n"

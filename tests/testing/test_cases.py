@@ -56,6 +56,7 @@ def test_what_fails_is_told_kept_and_drawn(fleet2d: Cli) -> None:
     assert ("2", "0", "2") == (numbers["trials"], numbers["held"], numbers["failed"])
 
 
+@pytest.mark.slow
 def test_the_command_that_is_printed_shows_the_moment_again(fleet2d: Cli) -> None:
     _, out, _ = fleet2d("test", written(still=FAILS), "simulation.duration=2 min")
     line = next(line for line in out.splitlines() if "see it" in line)

@@ -313,6 +313,7 @@ def test_moves(trial):
     assert "It took 1 trial: " in said
 
 
+@pytest.mark.slow
 def test_what_failed_is_told_with_its_worst_seed_and_what_is_not_covered(
     suite: Suite, tmp_path: Path
 ) -> None:

@@ -121,6 +121,7 @@ def test_what_is_no_branch_is_refused(body: bytes) -> None:
         read_body(body, BRANCH_ORDER, "not a valid wish")
 
 
+@pytest.mark.slow
 def test_branch_needs_the_page_s_origin(lives: LiveRuns, served: ServedRuns) -> None:
     own = "http://127.0.0.1:8765"
     client = TestClient(page_app(served, "token", 8765, lives), base_url=own)

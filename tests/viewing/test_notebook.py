@@ -59,6 +59,7 @@ def test_cell_of_a_notebook_that_only_imports_fleet2d_shows_runs_and_homes(tmp_p
     )
 
 
+@pytest.mark.slow
 def test_violated_expectation_comes_before_the_facts_of_a_run_and_notes_are_calm() -> None:
     changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
     run = fleet2d.run("bundled:paper", *changes, "expect.any=always(distance(ana, astro) > 0 m)")

@@ -54,6 +54,7 @@ def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
     assert following[-1] is None
 
 
+@pytest.mark.slow
 def test_moments_of_the_doubled_hour_are_told_apart_by_their_offset(tmp_path: Path) -> None:
     """The hour from two to three came twice, and one couldn't tell which of them a label meant."""
     autumn = {
