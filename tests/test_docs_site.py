@@ -73,6 +73,7 @@ def test_navigation_names_no_page_twice() -> None:
     assert len(nav()) == len(set(nav()))
 
 
+@pytest.mark.slow
 def test_navigation_names_each_page_that_is_written_or_made() -> None:
     pages = {**site.written_pages(), **site.generated_pages()}
     assert all(pages.values())

@@ -251,6 +251,7 @@ class Broken(fleet2d.Algorithm):
 """
 
 
+@pytest.mark.slow
 def test_the_command_line_shows_the_users_own_lines_and_where_the_run_is(
     fleet2d: Cli, tmp_path: Path
 ) -> None:

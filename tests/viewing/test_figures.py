@@ -66,6 +66,7 @@ def test_bodies_stand_where_the_run_has_them(run_dir: Path) -> None:
     assert (path.x[25_321], path.y[25_321]) == pytest.approx((disc.p0 + disc.p1) / 2)
 
 
+@pytest.mark.slow
 def test_kept_pictures_of_the_lit_home_change_no_frame(
     run_dir: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -95,6 +96,7 @@ def test_film_of_pictures_is_written(run_dir: Path, tmp_path: Path, ending: str)
     assert [target] == list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_pictures_of_a_film_look_as_they_were_drawn(run_dir: Path, tmp_path: Path) -> None:
     av = pytest.importorskip("av", reason="PyAV is not installed")
     run = fleet2d.open_run(run_dir)

@@ -12,6 +12,7 @@ from fleet2d.errors import InputError
 from fleet2d.viewing.notebook import home_png, run_html
 
 
+@pytest.mark.slow
 def test_run_draws_itself_and_its_moments(run_dir: Path) -> None:
     from matplotlib.figure import Figure
 

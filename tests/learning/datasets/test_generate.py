@@ -164,6 +164,7 @@ def unfit(folder: Path) -> dict[str, Any]:
     return {**SOURCE, "splits": {**SOURCE["splits"], "train": train}}
 
 
+@pytest.mark.slow
 def test_all_that_is_unfit_is_told_before_the_first_run_and_the_corrected_file_goes_on(
     tmp_path: Path,
 ) -> None:

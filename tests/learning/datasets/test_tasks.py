@@ -82,6 +82,7 @@ def test_tuned_networks_are_scored_on_the_days_after_those_that_tuned_them(tmp_p
     assert leaderboard(data, networks=Networks(tune=2)) == []
 
 
+@pytest.mark.slow
 def test_moments_at_which_nobody_knows_where_a_person_is_have_no_label(tmp_path: Path) -> None:
     """The log is silent between two rooms for an hour, which a stay in one room isn't."""
     log = tmp_path / "home_Sensors.txt"
