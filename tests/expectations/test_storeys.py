@@ -4,28 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
+from tests.two_storeys import PLAN
 
 import fleet2d
-
-
-def box(x: float) -> list[list[float]]:
-    return [[x, 0], [x + 5, 0], [x + 5, 4], [x, 4]]
-
-
-PLAN = {
-    "format": "fleet2d-floorplan",
-    "version": 1,
-    "free": [box(0), box(6)],
-    "rooms": [
-        {"name": "below", "type": "living_room", "polygon": box(0)},
-        {"name": "above", "type": "bedroom", "polygon": box(6)},
-    ],
-    "objects": [
-        {"name": "sofa", "type": "sofa", "footprint": [[4.2, 3], [5, 3], [5, 4], [4.2, 4]]},
-    ],
-    "portals": [{"type": "stairs", "start": [0.5, 3.5], "end": [10.5, 3.5], "takes": 10}],
-    "entrance": [0.5, 0.5],
-}
 
 
 def verdicts(

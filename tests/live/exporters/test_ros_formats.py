@@ -1,6 +1,7 @@
 """What ROS's own libraries read from exported files is what the run stored."""
 
 import json
+import math
 import signal
 from collections import defaultdict
 from collections.abc import Callable
@@ -11,8 +12,11 @@ import numpy as np
 import pytest
 from tests.live.exporters.worlds import END, FIRST, day, part, poses, rows
 from tests.scenes import process
+from tests.two_storeys import PLAN
 
+import fleet2d
 from fleet2d.errors import RunDirectoryError
+from fleet2d.live.exporters import Selection
 from fleet2d.live.exporters.bags import export_mcap, export_rosbag2
 from fleet2d.runs.robot_log import robot_log
 
@@ -144,6 +148,40 @@ def test_odometry_has_the_poses_and_the_speeds_between_them(messages: Messages) 
     np.testing.assert_allclose(moved / 30, np.hypot(*np.array(speeds)[1:].T), atol=1e-12)
 
 
+def test_a_robot_on_stairs_has_no_speed_of_their_length_in_the_plan(tmp_path: Path) -> None:
+    """The ends of the stairs are 10 m apart there, which was a speed of 10 m/s."""
+    from rosbags.highlevel import AnyReader
+
+    (tmp_path / "house.json").write_text(json.dumps(PLAN))
+    run = fleet2d.run(
+        {
+            "simulation": {"duration": "2 min"},
+            "floorplan": {"type": "native", "path": str(tmp_path / "house.json")},
+            "users": {},
+            "robots": {"astro": {"climbs": True, "behaviors": [], "start": [1.0, 2.0]}},
+            "script": [{"at": "5 s", "send": "astro", "to": "above"}],
+        }
+    )
+    export_rosbag2(run, tmp_path / "bag", Selection.of(run))
+    with AnyReader([tmp_path / "bag"]) as reader:
+        odometry = [c for c in reader.connections if c.topic == "/astro/odom"]
+        messages = [reader.deserialize(d, c.msgtype) for c, _, d in reader.messages(odometry)]
+    speeds = [math.hypot(m.twist.twist.linear.x, m.twist.twist.linear.y) for m in messages]
+    assert messages[-1].pose.pose.position.x > 6
+    assert 0.5 < max(speeds) < 0.7
+
+
+@pytest.mark.parametrize("export", [export_mcap, export_rosbag2])
+def test_topics_that_ros_refuses_are_told(export: Any, tmp_path: Path) -> None:
+    robots = {"astro": None, "Käfer": {"behaviors": []}, "robot-1": {"behaviors": []}}
+    scenario = {"extends": "bundled:paper", "simulation": {"duration": "1 min"}, "robots": robots}
+    run = fleet2d.run(scenario)
+    told = export(run, tmp_path / "run.mcap", Selection.of(run))
+    assert "ROS plays no topic with other letters than a-z, 0-9 and _: /Käfer/odom" in told
+    assert "/robot-1/odom" in told
+    assert "ROS" not in export(day(), tmp_path / "day.mcap", part())
+
+
 def test_map_has_the_free_cells_of_the_plan_at_their_places(messages: Messages) -> None:
     ((_, grid),) = messages["/map"]
 
@@ -267,6 +305,7 @@ def test_place_that_can_not_be_written_is_named(
 KILLED = """
 import os, signal, sys
 from pathlib import Path
+from fleet2d.live.exporters import Selection
 from fleet2d.live.exporters.bags import McapWriter, export_rosbag2
 from tests.live.exporters.worlds import day, part
 

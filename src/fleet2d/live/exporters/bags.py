@@ -1,6 +1,7 @@
 """ROS 2 messages in an MCAP file, alone or as a bag: needs the extra `ros`."""
 
 import json
+import re
 import struct
 import zlib
 from collections import Counter
@@ -10,6 +11,7 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
+from fleet2d.bounds import one_line
 from fleet2d.errors import RunDirectoryError
 from fleet2d.kernels import I64, U8
 from fleet2d.live.exporters import Records, Selection, new_file
@@ -37,6 +39,7 @@ MESSAGE_HEAD = np.dtype(
 )
 """What stands before the content of a message."""
 QOS = "offered_qos_profiles"
+_TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 COMPRESSION = "zstd"
 # Covariances are zeros: higher levels save little.
 COMPRESSION_LEVEL = 1
@@ -66,7 +69,8 @@ def export_mcap(run: Run, path: Path, part: Selection) -> str:
     with new_file(layout) as file:
         file.write(json.dumps(foxglove_layout(messages), indent=1).encode())
     size = path.stat().st_size / 1e6
-    return f"{writer.counts.total():,} messages in {path}, {size:.1f} MB; layout: {layout}"
+    total = f"{writer.counts.total():,} messages in {path}, {size:.1f} MB"
+    return f"{total}; layout: {layout}{_refused(messages)}"
 
 
 class WrittenChunk(NamedTuple):
@@ -345,7 +349,16 @@ def export_rosbag2(run: Run, path: Path, part: Selection) -> str:
         raise RunDirectoryError(f"{path} exists: name another folder, or remove it") from None
     except OSError as error:
         raise RunDirectoryError(f"{path} can't be written: {error}") from error
-    return f"{writer.counts.total():,} messages in {path}"
+    return f"{writer.counts.total():,} messages in {path}{_refused(messages)}"
+
+
+def _refused(messages: RosMessages) -> str:
+    """Return a remark on topics whose names ROS refuses when a bag is played."""
+    names = [name for name in messages.topics if not _TOPIC.fullmatch(name)]
+    if not names:
+        return ""
+    shown = one_line(", ".join(names), 100)
+    return f"; ROS plays no topic with other letters than a-z, 0-9 and _: {shown}"
 
 
 def _write(messages: RosMessages, file: BinaryIO) -> "McapWriter":

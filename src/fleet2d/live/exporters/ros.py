@@ -28,6 +28,7 @@ from fleet2d.live.ros.topics import (
     transform,
 )
 from fleet2d.live.ros.types import MessageEncoder
+from fleet2d.live.twists import twists
 from fleet2d.runs.robot_log import LogEntry, robot_log
 from fleet2d.runtime.local_time import stamp_us
 from fleet2d.storage.bags import LOG_LEVELS, LOG_TYPE, ros_types
@@ -135,7 +136,7 @@ class RosMessages:
         begin = self._time(self._records.part.first)
         once = [(MAP, self._map(begin)), (STATIC, self._static_transforms(begin))]
         yield [self._block(topic, [begin], [data]) for topic, data in once]
-        last: dict[str, tuple[float, float, float]] = {}
+        last: dict[str, F64] = {}
         logs = self._logs()
         for chunk in self._records.chunks():
             blocks: list[Block] = []
@@ -209,21 +210,15 @@ class RosMessages:
 
         return Template(message, len(names), 4 * len(names))
 
-    def _odometry(
-        self, chunk: Chunk, robot: str, last: dict[str, tuple[float, float, float]]
-    ) -> list[Block]:
+    def _odometry(self, chunk: Chunk, robot: str, last: dict[str, F64]) -> list[Block]:
         path = chunk.poses[robot]
         if not len(path.x):
             return []
-        before = last.get(robot, (path.x[0], path.y[0], path.heading[0]))
-        last[robot] = (path.x[-1], path.y[-1], path.heading[-1])
-        passed = self._records.part.every.total_seconds()
-        dx, dy = np.diff(path.x, prepend=before[0]), np.diff(path.y, prepend=before[1])
-        turned = np.diff(path.heading, prepend=before[2])
-        turned = (turned + np.pi) % (2 * np.pi) - np.pi
-        cos = np.cos(path.heading)
-        sin = np.sin(path.heading)
-        speeds = ((dx * cos + dy * sin) / passed, (dy * cos - dx * sin) / passed, turned / passed)
+        poses = np.stack([path.x, path.y, path.heading], axis=-1)
+        before = np.vstack([last.get(robot, poses[0]), poses[:-1]])
+        last[robot] = poses[-1]
+        passed_s = self._records.part.every.total_seconds()
+        speeds = twists(self._run.plan, before, poses, passed_s).T
         at = np.flatnonzero(~path.away)
         stamps = self._start_ns + path.step[at] * self._step_ns
         values = [*_planar(path, at), *(speed[at] for speed in speeds)]

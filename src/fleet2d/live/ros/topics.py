@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fleet2d.kernels import F64, Mesh, region_outline, visible_region
+from fleet2d.live.twists import twists
 from fleet2d.runtime.local_time import stamp_us
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class RosTopics:
         self._root = root
         self._start_ns = stamp_us(simulation.clock.start) * 1000
         self._step_ns = simulation.clock.step_us * 1000
-        self._last: dict[str, tuple[float, float, float]] = {}
+        self._last: dict[str, F64] = {}
         self._scans: dict[str, tuple[object, Any]] = {}
         self._clock = RosTopic("/clock", "rosgraph_msgs/msg/Clock")
         self._map = RosTopic("/map", "nav_msgs/msg/OccupancyGrid", is_latched=True)
@@ -142,16 +143,12 @@ class RosTopics:
         x = body["x"]
         y = body["y"]
         heading = body["heading"]
-        before = self._last.get(robot, (x, y, heading))
-        self._last[robot] = x, y, heading
-        passed_s = self._step_ns / 1e9
-        dx = (x - before[0]) / passed_s
-        dy = (y - before[1]) / passed_s
-        ahead = dx * math.cos(heading) + dy * math.sin(heading)
-        left = dy * math.cos(heading) - dx * math.sin(heading)
-        turn = (heading - before[2] + math.pi) % (2 * math.pi) - math.pi
+        pose = np.array([[x, y, heading]])
+        before = self._last.get(robot, pose)
+        self._last[robot] = pose
+        plan = self._simulation.home.plan
+        (speeds,) = twists(plan, before, pose, self._step_ns / 1e9).tolist()
         header = self._header(step, self.frame(robot, "odom"))
-        speeds = (ahead, left, turn / passed_s)
         return odometry(header, self.frame(robot, "base_link"), pose_at(x, y, heading), speeds)
 
     def _scan(self, step: int, robot: str, body: Mapping[str, Any]) -> dict[str, Any]:
