@@ -25,6 +25,7 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 OVER = "robots.astro.speed={low: 0.05, high: 0.6}"
 ALIASES = ", ".join(f"&a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 10))
 BOMB = f"[&a0 [1, 1], {ALIASES}]"
+AFAR = "robots.astro.start=[[500.0, 500.0], [600.0, 600.0]]"
 
 
 @pytest.fixture
@@ -149,6 +150,10 @@ def test_it_goes_on_after_its_first_find_and_says_what_fails_apart(folder: Path)
         (["test_flat.py::test_come", "--over", OVER], "did you mean 'test_comes'"),
         (["test_flat.py::test_more", "--over", OVER], "other arguments (tmp_path)"),
         (["flat.yaml", "--over", OVER, "--out", "flat.yaml"], "exists already"),
+        (["flat.yaml", "--over", "home={synthetic: 0}"], "expected 1 home or more, got none"),
+        (["flat.yaml", "--over", "home={synthetic: []}"], "expected 1 home or more, got none"),
+        (["flat.yaml", "--over", OVER, "--budget", "0 s"], "0 s was over before the first run"),
+        (["flat.yaml", "--over", AFAR, "--budget", "2"], "none of 2 runs could be done: "),
     ],
 )
 def test_wrong_input_is_refused_in_words(folder: Path, arguments: list[str], words: str) -> None:

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from fleet2d.bounds import VARIANTS
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.documents import Keys
-from fleet2d.configuration.problems import did_you_mean, problem
+from fleet2d.configuration.problems import did_you_mean, problem, problem_at
 from fleet2d.configuration.units import folder_of
 from fleet2d.errors import ScenarioError, extra
 from fleet2d.kernels import F64
@@ -296,6 +296,11 @@ class SyntheticAxis(Axis):
     synthetic: Count | tuple[int, ...]
     first: int = Field(default=0, ge=0)
     settings: dict[str, Any] = Field(default={})
+
+    def model_post_init(self, _: object, /) -> None:
+        """Refuse an axis without homes."""
+        if not len(self.seeds):
+            raise problem_at(("synthetic",), "expected 1 home or more, got none")
 
     @property
     def seeds(self) -> Sequence[int]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import yaml
 
+from fleet2d.configuration.problems import counted
 from fleet2d.errors import InputError, RunDirectoryError, os_errors_as
 from fleet2d.options import Workers
 from fleet2d.runtime.progress import progress_bar
@@ -84,6 +85,11 @@ def falsify(
         search.run(crew, seconds, update)
         took = in_words(timedelta(seconds=time.monotonic() - begin_s))
     answer = search.answer(f"When does {target} fail?", took)
+    if not search.tries:
+        raise InputError(f"--budget: {budget} was over before the first run: nothing was tried")
+    if sum(search.errors.values()) == search.tries:
+        first = next(iter(search.errors))
+        raise InputError(f"none of {counted(search.tries, 'run')} could be done: {first}")
     if search.failure is None:
         typer.echo(answer)
         return
