@@ -145,3 +145,93 @@ def test_wrong_trees_and_slots_are_refused() -> None:
         wing_rooms(np.array([(0, -1, 0)]), back, areas, corridor, 50, 44, 124)
     with pytest.raises(ValueError, match="indices of limits"):
         is_promising(np.array([(ROOMS, 0, 0, 9, 9)]), LIMITS)
+
+
+ONE = np.array([(0, -1, 0)])
+TWO = np.array([(0, -1, 0), (1, -1, 0)])
+OTHERS = np.array([(2, -1, 0), (3, -1, 0)])
+
+
+def test_closets_are_as_long_as_their_bounds() -> None:
+    areas = areas_of(0)
+    corridor = CorridorRule(11, 24, False, 10)
+    lengths = set()
+    for area in range(100, 2200, 6):
+        areas[10] = area
+        found = row_rooms(TWO, areas, corridor, 200, 20, 240).tolist()
+        assert slow.row_rooms(TWO, areas, corridor, 200, 20, 240).tolist() == found
+        lengths |= {x1 - x0 for room, x0, _, x1, _ in found if room == 10}
+
+    assert lengths == set(range(24, 53))
+
+
+@pytest.mark.parametrize("closet", [-1, 10])
+def test_a_corridor_is_left_out_where_it_would_be_too_short(closet: int) -> None:
+    areas = np.full(ROOMS, 2400.0)
+    areas[10] = 720.0
+    corridor = CorridorRule(11, 24, False, closet)
+    ends = set()
+    for length in range(15, 110):
+        found = row_rooms(ONE, areas, corridor, length, 20, 240).tolist()
+        assert slow.row_rooms(ONE, areas, corridor, length, 20, 240).tolist() == found
+        ends |= {x1 - x0 for room, x0, _, x1, _ in found if room == 11}
+
+    assert min(ends) == 24
+
+
+def test_the_last_room_of_the_front_reaches_the_corridor_at_every_place() -> None:
+    areas = np.full(ROOMS, 6000.0)
+    areas[3] = 3000.0
+    corridor = CorridorRule(11, 24, True, -1)
+    beyond = set()
+    for area in range(4000, 9000, 10):
+        areas[0] = area
+        asked = (TWO, OTHERS, areas, corridor, 60, 20, 240)
+        found, depth = wing_rooms(*asked)
+        expected, expected_depth = slow.wing_rooms(*asked)
+        assert (expected.tolist(), expected_depth) == (found.tolist(), depth)
+        starts = {room: x0 for room, x0, *_ in found.tolist()}
+        if starts:
+            beyond.add(starts[1] - starts[3])
+
+    assert {-26, -25} <= beyond  # nearer than that, the suite is given up
+
+
+def test_of_equals_the_first_counts() -> None:
+    areas = np.full(ROOMS, 4000.0)
+    nodes = np.array([(-2, 2), (0, 100), (1, 100), (-2, 2), (1, 100), (0, 100)])
+    trees = Divisions(nodes, np.array([0, 3]))
+    sides, mouths = np.array([0, 0, 120, 66]), np.zeros((0, 4), np.int64)
+    assert [0, 1] == squarest_rooms(trees, areas, sides, mouths)[:, 0].tolist()
+
+    corridor = CorridorRule(11, 24, False, -1)
+    asked = (
+        TWO,
+        OTHERS,
+        areas,
+        corridor,
+        np.array([70, 70]),
+        20,
+        240,
+        np.array([(1.0, 99.0)] * 12),
+    )
+    assert slow.squarest_depth(*asked) == squarest_depth(*asked) == 0
+
+
+def test_rooms_at_their_limits_are_promising() -> None:
+    for width, is_so in ((73, True), (74, True), (75, False)):
+        boxes = np.array([(0, 0, 0, width, 26)])
+        assert slow.is_promising(boxes, LIMITS) == is_promising(boxes, LIMITS) == is_so
+    for height, is_so in ((25, False), (26, True)):
+        boxes = np.array([(0, 0, 0, 40, height)])
+        assert slow.is_promising(boxes, LIMITS) == is_promising(boxes, LIMITS) == is_so
+
+
+@pytest.mark.parametrize("height", range(1, 6))
+def test_rooms_without_a_height_are_as_slender_as_said(height: int) -> None:
+    areas = areas_of(2)
+    nodes = np.array([(-1, 2), (0, 100), (1, 100), (-2, 2), (0, 100), (1, 100)])
+    trees = Divisions(nodes, np.array([0, 3]))
+    sides, mouths = np.array([0, 0, 90, height]), np.zeros((0, 4), np.int64)
+    expected = slow.squarest_rooms(trees, areas, sides, mouths)
+    assert expected.tolist() == squarest_rooms(trees, areas, sides, mouths).tolist()

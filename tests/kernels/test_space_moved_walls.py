@@ -32,3 +32,29 @@ def test_walls_of_a_room_move_inwards_and_those_of_a_pillar_outwards() -> None:
     assert 0 == len(move_walls(np.array([(0, 0), (9, 9), (0, 9)]), 1, 0))
     with pytest.raises(ValueError, match="half must be"):
         move_walls(room, 4, 5)
+
+
+WIDTHS = (0, 1, 4, 6)  # of the lines of a grid, whose cells are 1 to 3 wide
+
+
+@pytest.mark.parametrize("half_of", [0.0, 0.5, 1.0])
+def test_every_small_outline_equals_the_slow_one(half_of: float) -> None:
+    """Steps, notches and pillars as narrow as the reach, and narrower."""
+    cells = [
+        shapely.box(WIDTHS[k % 3], WIDTHS[k // 3], WIDTHS[k % 3 + 1], WIDTHS[k // 3 + 1])
+        for k in range(9)
+    ]
+    for mask in range(1, 512):
+        area = shapely.union_all([cells[k] for k in range(9) if mask >> k & 1])
+        if not isinstance(area, Polygon):
+            continue
+        for ring in shapely.get_rings(shapely.orient_polygons(area)):
+            corners = shapely.get_coordinates(ring)[:-1].astype(np.int64)
+            for reach in range(5):
+                asked = (corners, reach, int(half_of * reach))
+                assert slow.move_walls(*asked).tolist() == move_walls(*asked).tolist()
+
+
+def test_a_wall_that_turns_back_moves_nowhere() -> None:
+    ring = np.array([(0, 0), (10, 0), (5, 0), (5, 10), (0, 10)])
+    assert 0 == len(slow.move_walls(ring, 1, 0)) == len(move_walls(ring, 1, 0))
