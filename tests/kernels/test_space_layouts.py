@@ -235,3 +235,16 @@ def test_rooms_without_a_height_are_as_slender_as_said(height: int) -> None:
     sides, mouths = np.array([0, 0, 90, height]), np.zeros((0, 4), np.int64)
     expected = slow.squarest_rooms(trees, areas, sides, mouths)
     assert expected.tolist() == squarest_rooms(trees, areas, sides, mouths).tolist()
+
+
+@pytest.mark.parametrize(("bay", "least"), [(0, 20), (-10, 31), (10, 21)])
+def test_strips_are_as_deep_as_their_bounds(bay: int, least: int) -> None:
+    slots = np.array([(0, -1, bay), (1, -1, 0)])
+    areas = np.full(ROOMS, 4000.0)
+    depths = set()
+    for length in range(30, 600):
+        found = strip_rooms(slots, areas, length, 1, 300).tolist()
+        assert slow.strip_rooms(slots, areas, length, 1, 300).tolist() == found
+        depths |= {y1 for room, _, _, _, y1 in found if room == 1}
+
+    assert least == min(depths - {0})
