@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
+#include <functional>
 #include <limits>
-#include <optional>
+#include <queue>
+#include <stdexcept>
 #include <vector>
 
 #include "lattice.hpp"
@@ -139,35 +142,13 @@ private:
     std::size_t waiting_ = 0;                        // their number
 };
 
-// A power of two above the most that a step costs.
-constexpr i64 COST_BUCKETS = i64{1} << 14;
-static_assert(7 * (200 + 2 * MAX_COST) < COST_BUCKETS);
+// A cell that a search has reached.
+struct ReachedCell {
+    i64 bound;      // of the cost of a path through it
+    i64 travelled;  // the cost from the goal
+    GridCell cell;
 
-// A queue of cells by cost: all costs in it differ by less than COST_BUCKETS.
-class CostQueue {
-public:
-    bool empty() const { return waiting_ == 0; }
-
-    void push(i64 cost, GridCell cell) {
-        buckets_[bucket_of(cost)].push_back(cell);
-        ++waiting_;
-    }
-
-    // One of the cells with exactly this cost, the newest first.
-    std::optional<GridCell> pop(i64 cost) {
-        auto& bucket = buckets_[bucket_of(cost)];
-        if (bucket.empty()) return std::nullopt;
-        const GridCell cell = bucket.back();
-        bucket.pop_back();
-        --waiting_;
-        return cell;
-    }
-
-private:
-    static std::size_t bucket_of(i64 cost) { return static_cast<std::size_t>(cost & (COST_BUCKETS - 1)); }
-
-    std::vector<std::vector<GridCell>> buckets_{static_cast<std::size_t>(COST_BUCKETS)};
-    i64 waiting_ = 0;
+    bool operator>(const ReachedCell& other) const { return bound > other.bound; }
 };
 
 // The steps to the eight neighbors, row by row.
@@ -285,54 +266,50 @@ Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goal
     return result;
 }
 
-Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell start) {
-    auto result = Array<i64, 2>::filled(cost.shape, -1);
-    const View<i64, 2> distance = result;
-    if (at(cost, goal) < 0) return result;
-    CostQueue waiting;
-    at(distance, goal) = 0;
-    waiting.push(0, goal);
-    for (i64 now = 0; !waiting.empty(); ++now) {
-        while (const auto cell = waiting.pop(now)) {
-            if (at(distance, *cell) != now) continue;  // a cheaper path was found since
-            if (*cell == start) return result;
-            for (const GridCell step : NEIGHBORS) {
-                const GridCell beside = *cell + step;
-                if (!is_open(cost, *cell, beside)) continue;
-                const i64 there = now + step_cost(cost, *cell, beside);
-                if (at(distance, beside) < 0 || there < at(distance, beside)) {
-                    at(distance, beside) = there;
-                    waiting.push(there, beside);
-                }
-            }
+Array<i64, 2> cheapest_cells(View<const i32, 2> cost, GridCell start, GridCell goal) {
+    auto way = Array<i64, 2>::empty({0, 2});
+    if (at(cost, goal) < 0) return way;
+    auto distances = Array<i64, 2>::filled(cost.shape, -1);
+    const View<i64, 2> distance = distances;
+    std::priority_queue<ReachedCell, std::vector<ReachedCell>, std::greater<>> waiting;
+    const auto reach = [&](GridCell cell, i64 travelled) {
+        at(distance, cell) = travelled;
+        const i64 rows = std::abs(cell.row - start.row), columns = std::abs(cell.column - start.column);
+        const i64 least = STRAIGHT * std::max(rows, columns) + (ACROSS - STRAIGHT) * std::min(rows, columns);
+        waiting.push({travelled + FREE_COST * least, travelled, cell});
+    };
+    reach(goal, 0);
+    // Until all cells of all cheapest paths are known.
+    for (i64 cheapest = std::numeric_limits<i64>::max(); !waiting.empty() && waiting.top().bound <= cheapest;) {
+        const auto [bound, travelled, cell] = waiting.top();
+        waiting.pop();
+        if (at(distance, cell) != travelled) continue;  // a cheaper path was found since
+        if (cell == start) cheapest = travelled;
+        for (const GridCell step : NEIGHBORS) {
+            const GridCell beside = cell + step;
+            if (!is_open(cost, cell, beside)) continue;
+            const i64 there = travelled + step_cost(cost, cell, beside);
+            if (at(distance, beside) < 0 || there < at(distance, beside)) reach(beside, there);
         }
     }
-    return result;
-}
-
-Array<i64, 2> descend(View<const i32, 2> cost, View<const i64, 2> distance, GridCell start) {
-    const auto next_cell = [&](GridCell cell) -> std::optional<GridCell> {
+    const auto next_cell = [&](GridCell cell) {
         for (const GridCell step : NEIGHBORS) {
             const GridCell beside = cell + step;
             if (!is_open(cost, cell, beside) || at(distance, beside) < 0) continue;
             if (at(distance, beside) == at(distance, cell) - step_cost(cost, cell, beside)) return beside;
         }
-        return std::nullopt;
+        throw std::logic_error("a cell has no neighbor on its way");
     };
-    if (at(distance, start) < 0) return Array<i64, 2>::empty({0, 2});
-    auto way = Array<i64, 2>::empty({64, 2});
+    if (at(distance, start) < 0) return way;
     i64 count = 0;
-    for (std::optional<GridCell> cell = start; cell.has_value(); cell = next_cell(*cell)) {
+    for (GridCell cell = start;; cell = next_cell(cell)) {
         way.grow(count + 1, count);
-        way(count, 0) = cell->row;
-        way(count, 1) = cell->column;
+        way(count, 0) = cell.row;
+        way(count, 1) = cell.column;
         ++count;
-        if (at(distance, *cell) == 0) {
-            way.truncate(count);
-            return way;
-        }
+        if (cell == goal) break;
     }
-    way.truncate(0);
+    way.truncate(count);
     return way;
 }
 

@@ -36,13 +36,7 @@ Array<i32, 2> climb(View<const i32, 2> labels, View<const i64, 2> height);
 // distance).
 Array<i32, 2> walking_distance(View<const bool, 2> mask, View<const i64, 2> goals);
 
-// The cost of the cheapest path from each cell to a goal, in 1/1000 of a cell's side at no extra
-// cost, (rows, columns); -1 where no path is known.
-//
-// `cost` is the extra cost of cells, (rows, columns), in percent: 100 doubles it; from 0 to
-// MAX_COST, or -1 for blocked cells. Cells farther away than `start` are not computed; with a start
-// outside the grid all are (Dial, as above; all in integers).
-Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell start);
+inline constexpr i64 FREE_COST = 200;  // of a step for each fifth of a cell's side, without extra cost
 
 // The cost of a step between two neighboring cells [1/1000 of a cell's side].
 //
@@ -50,12 +44,14 @@ Array<i64, 2> cost_distance(View<const i32, 2> cost, GridCell goal, GridCell sta
 // that it leaves, half by that of the one it enters.
 constexpr i64 step_cost(View<const i32, 2> cost, GridCell from, GridCell to) {
     const i64 length = from.row == to.row || from.column == to.column ? 5 : 7;
-    return length * (i64{200} + at(cost, from) + at(cost, to));
+    return length * (FREE_COST + at(cost, from) + at(cost, to));
 }
 
-// The cells (n, 2) of a cheapest path from `start` to the goal, by the distances that cost_distance
-// returned for the same costs; of equally cheap neighbors the first, row by row. Empty if no path
-// from the start is known.
-Array<i64, 2> descend(View<const i32, 2> cost, View<const i64, 2> distance, GridCell start);
+// The cells (n, 2) of a cheapest path from one cell to another; of equally cheap next ones the first, row by row. Empty
+// if there is no path.
+//
+// `cost` is the extra cost of cells, (rows, columns), in percent: 100 doubles it; from 0 to
+// MAX_COST, or -1 for blocked cells (A*, from the goal; all in integers).
+Array<i64, 2> cheapest_cells(View<const i32, 2> cost, GridCell start, GridCell goal);
 
 }  // namespace fleet2d

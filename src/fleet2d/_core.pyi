@@ -451,40 +451,27 @@ def walking_distance(mask: numpy.typing.NDArray[numpy.bool_], goals: numpy.typin
         int32 (rows, columns), fifths of a cell's side; -1 where no goal can be reached.
     """
 
-def cost_distance(cost: numpy.typing.NDArray[numpy.int32], goal: tuple[int, int], start: tuple[int, int]) -> numpy.typing.NDArray[numpy.int64]:
-    """
-    Return the cost of the cheapest path from each cell to a goal.
-
-    A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
-    are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
-
-    Args:
-        cost: int32 (rows, columns), in percent of what a way costs besides: 100 counts double; from
-            0 to 1000, or -1 where no way leads.
-        goal: The goal's cell (row, column).
-        start: The cell to come from: what is farther away than it is not worked out. With one outside
-            the grid everything is.
-
-    Returns:
-        int64 (rows, columns), in 1/1000 of a cell's side at no cost; -1 where no way is known.
-    """
-
 def step_cost(cost: numpy.typing.NDArray[numpy.int32], row: int, column: int, r: int, c: int) -> int:
     """
     Return the cost of a step between two neighboring cells [1/1000 of a cell's side].
     """
 
-def descend(cost: numpy.typing.NDArray[numpy.int32], distance: numpy.typing.NDArray[numpy.int64], start: tuple[int, int]) -> numpy.typing.NDArray[numpy.int64]:
+def cheapest_cells(cost: numpy.typing.NDArray[numpy.int32], start: tuple[int, int], goal: tuple[int, int]) -> numpy.typing.NDArray[numpy.int64]:
     """
-    Return the cells of a cheapest path from a cell to the goal; of equal neighbors the first.
+    Return the cells of a cheapest path from one cell to another.
+
+    A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
+    are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
+    Of equally cheap next cells it takes the first.
 
     Args:
-        cost: int32 (rows, columns), as for `cost_distance`.
-        distance: int64 (rows, columns), what `cost_distance` returned for the same costs.
-        start: The cell to start from (row, column).
+        cost: int32 (rows, columns), in percent of what a way costs besides: 100 counts double; from
+            0 to 1000, or -1 where no way leads.
+        start: The cell (row, column) where it begins.
+        goal: The cell (row, column) where it ends.
 
     Returns:
-        int64 (n, 2) as (row, column); empty if no path from the start is known.
+        int64 (n, 2) as (row, column); empty if there is no path.
     """
 
 def corner_sums(mask: numpy.typing.NDArray[numpy.bool_]) -> numpy.typing.NDArray[numpy.int32]:

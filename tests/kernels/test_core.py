@@ -550,9 +550,8 @@ CALLS: dict[str, Args] = {
     "box_sums": lambda: (COSTS.astype(np.int64), 1),
     "climb": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.astype(np.int64)),
     "walking_distance": lambda: (MASK.copy(), np.array([[0, 0], [2, 3]])),
-    "cost_distance": lambda: (COSTS.copy(), (0, 0), (2, 3)),
+    "cheapest_cells": lambda: (COSTS.copy(), (2, 3), (0, 0)),
     "step_cost": lambda: (COSTS.copy(), 0, 0, 0, 1),
-    "descend": lambda: (COSTS.copy(), _core.cost_distance(COSTS, (0, 0), (-1, -1)), (2, 3)),
     "leg_cost": lambda: (COSTS.copy(), 5, 5, 200, 150),
     "pull_taut": lambda: (
         MESH,

@@ -91,27 +91,6 @@ Args:
 Returns:
     int32 (rows, columns), fifths of a cell's side; -1 where no goal can be reached.)");
     m.def(
-        "cost_distance",
-        [](View<const i32, 2> cost, Cell goal, Cell start) {
-            check_costs(cost);
-            return cost_distance(cost, cell_of(cost, goal), grid_cell(start));
-        },
-        "cost"_a, "goal"_a, "start"_a, Unlocked(),
-        R"(Return the cost of the cheapest path from each cell to a goal.
-
-A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
-are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
-
-Args:
-    cost: int32 (rows, columns), in percent of what a way costs besides: 100 counts double; from
-        0 to 1000, or -1 where no way leads.
-    goal: The goal's cell (row, column).
-    start: The cell to come from: what is farther away than it is not worked out. With one outside
-        the grid everything is.
-
-Returns:
-    int64 (rows, columns), in 1/1000 of a cell's side at no cost; -1 where no way is known.)");
-    m.def(
         "step_cost",
         [](View<const i32, 2> cost, i64 row, i64 column, i64 r, i64 c) {
             return step_cost(cost, cell_of(cost, {row, column}), cell_of(cost, {r, c}));
@@ -119,22 +98,26 @@ Returns:
         "cost"_a, "row"_a, "column"_a, "r"_a, "c"_a,
         "Return the cost of a step between two neighboring cells [1/1000 of a cell's side].");
     m.def(
-        "descend",
-        [](View<const i32, 2> cost, View<const i64, 2> distance, Cell start) {
+        "cheapest_cells",
+        [](View<const i32, 2> cost, Cell start, Cell goal) {
             check_costs(cost);
-            require(cost.shape == distance.shape, "cost and distance must have one shape");
-            return descend(cost, distance, cell_of(cost, start));
+            return cheapest_cells(cost, cell_of(cost, start), cell_of(cost, goal));
         },
-        "cost"_a, "distance"_a, "start"_a, Unlocked(),
-        R"(Return the cells of a cheapest path from a cell to the goal; of equal neighbors the first.
+        "cost"_a, "start"_a, "goal"_a, Unlocked(),
+        R"(Return the cells of a cheapest path from one cell to another.
+
+A step to a side is 5 long and one across a corner 7, which is open only if both cells beside it
+are; half of it counts by the cost of the cell that it leaves, half by that of the one it enters.
+Of equally cheap next cells it takes the first.
 
 Args:
-    cost: int32 (rows, columns), as for `cost_distance`.
-    distance: int64 (rows, columns), what `cost_distance` returned for the same costs.
-    start: The cell to start from (row, column).
+    cost: int32 (rows, columns), in percent of what a way costs besides: 100 counts double; from
+        0 to 1000, or -1 where no way leads.
+    start: The cell (row, column) where it begins.
+    goal: The cell (row, column) where it ends.
 
 Returns:
-    int64 (n, 2) as (row, column); empty if no path from the start is known.)");
+    int64 (n, 2) as (row, column); empty if there is no path.)");
 }
 
 }  // namespace fleet2d

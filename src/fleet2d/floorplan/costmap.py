@@ -20,8 +20,7 @@ from fleet2d.kernels import (
     MAX_COST,
     SUB,
     Bool,
-    cost_distance,
-    descend,
+    cheapest_cells,
     label_parts,
     pull_taut,
     squared_distance,
@@ -198,8 +197,7 @@ def route_by_cost(
         costs[closed] = MAX_COST  # a body that stands there may leave
     first = _nearest(space, costs >= 0, start)
     assert first is not None
-    field = cost_distance(costs, last, first)
-    route_cells = descend(costs, field, first)
+    route_cells = cheapest_cells(costs, first, last)
     if len(route_cells) == 0:
         return None
     centres = route_cells[:, ::-1] * SUB + CELL_CENTRE
