@@ -12,7 +12,7 @@ from collections.abc import (
 )
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Self, TypeVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self, TypeVar
 
 from pydantic import BaseModel
 
@@ -75,8 +75,10 @@ class Watcher:
         awaited: Kinds of events that end a span, whatever plans wait for.
         steered: Rows of the bodies whose plans it may replace at any step.
         files: The files that it has read.
+        hears_plans: Whether it hears of plans that begin and are replaced.
     """
 
+    hears_plans: ClassVar[bool] = True
     next_step: int = 0
     awaited: Set[str] = frozenset()
     steered: Collection[int] = ()

@@ -127,6 +127,7 @@ class Cameras(Watcher):
         notes: What is to be said about its source.
     """
 
+    hears_plans = False
     knows_truth = True
     notes: tuple[str, ...] = ()
     _levels: tuple[I64, I64, I64]  # of cameras and what they look at, if heights matter

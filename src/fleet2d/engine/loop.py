@@ -124,7 +124,7 @@ def _decide(state: State, row: int, step: int) -> bool:
         situation = state.situation(row, step)
         state.pending.pop(row, None)
         begins = not actor.keeps_plan(situation)
-        for watcher in state.watchers:
+        for watcher in state.listening:
             watcher.listen(row)  # for other events, if other behaviors listen now
     if begins:
         state.end_plan(row, step)

@@ -45,6 +45,8 @@ class SeenArea(Watcher):
         next_step: The first step that is not included.
     """
 
+    hears_plans = False
+
     def __init__(
         self,
         robot: DecidingActor,

@@ -230,7 +230,6 @@ class State:
     expectations: "RunExpectations | None" = None
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
-    steering: list[Watcher] = field(init=False)
     yielding: "Yielding | None" = None
     _situation: Situation | None = None  # the newest one
 
@@ -243,6 +242,7 @@ class State:
         self.notes_emitted = [0] * len(self.actors)
         self.capacity = capacity_of(len(self.actors))
         self.steering = [watcher for watcher in self.watchers if watcher.steered]
+        self.listening = [watcher for watcher in self.watchers if watcher.hears_plans]
 
     def find(self, kind: type[W]) -> W | None:
         """Return the watcher of a kind; None if the run needs none."""
@@ -282,6 +282,7 @@ class State:
             self.expectations = RunExpectations(scenario, run, sensors, self.interventions)
             self.expectations.next_step = self.settled
             self.watchers.append(self.expectations)
+            self.listening.append(self.expectations)
             self.events.sinks.append(self.expectations)
         self.expectations.add(name, expectation, since, self.settled)
 
@@ -302,7 +303,7 @@ class State:
         """Record the plan of a body up to the step at which it is replaced."""
         self.events.emit(self._due_notes(row, step))
         self.recorder.before_plan(row, step)
-        for watcher in self.watchers:
+        for watcher in self.listening:
             watcher.before_plan(row, self.actors[row], step)
 
     def begin_plan(self, row: int, step: int) -> None:
@@ -310,7 +311,7 @@ class State:
         self.notes_emitted[row] = 0
         self.events.emit(self._due_notes(row, step))
         self.recorder.after_plan(row, step)
-        for watcher in self.watchers:
+        for watcher in self.listening:
             watcher.listen(row)
             watcher.begin_plan(self.actors[row])
 
