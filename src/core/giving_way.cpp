@@ -8,6 +8,9 @@
 namespace fleet2d {
 namespace {
 
+constexpr i64 FIRST_ASIDE = 12;   // cells to each side at which it first looks for places
+constexpr i64 STRAIGHT_STEP = 5;  // of `walking_distance`, to the side of a cell
+
 std::size_t nth(i64 i) { return static_cast<std::size_t>(i); }
 
 i64 length_of(const TrackPiece& track) { return static_cast<i64>(track.time.size()); }
@@ -147,9 +150,8 @@ i64 next_stop(const TrackPiece& track, i64 moment, const std::function<bool(Poin
     return -1;
 }
 
-std::optional<Detour> way_after_a_wait(Timelines& timelines, i64 row, i64 step, View<const i64> waits,
-                                       const Distances& distances, i64 end) {
-    const KnownWays ways(timelines, step, end);
+std::optional<Detour> way_after_a_wait(Timelines& timelines, const KnownWays& ways, i64 row, i64 step,
+                                       View<const i64> waits, const Distances& distances) {
     const Moment now = moment_of(timelines, row, step);
     const TrackPiece* track = followed(timelines, row);
     for (const i64 wait : waits) {
@@ -166,10 +168,9 @@ std::optional<Detour> way_after_a_wait(Timelines& timelines, i64 row, i64 step, 
     return {};
 }
 
-std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, i64 step, i64 met,
-                                     View<const i64, 2> places, View<const i64> waits, i64 rests,
-                                     const Distances& distances, i64 end) {
-    const KnownWays ways(timelines, step, end);
+std::optional<Detour> way_by_a_place(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step,
+                                     i64 met, View<const i64, 2> places, View<const i64> waits, i64 rests,
+                                     const Distances& distances) {
     const i64 step_us = timelines.step_us();
     const Moment now = moment_of(timelines, body.row, step);
     const TrackPiece* track = followed(timelines, body.row);
@@ -243,13 +244,14 @@ std::optional<Detour> way_from_here(Timelines& timelines, const Yielder& body, i
     return go_on_beside(detour, now, *track, body, begin, since, stop) ? std::optional(detour) : std::nullopt;
 }
 
-std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end, const Cells& cells, Point from,
-                                const Search& search, View<const i64> reach) {
+namespace {
+
+// Cells to which a body can step aside from one, with their walking distances: every so many cells, so many to each
+// side at most.
+std::vector<std::pair<i32, GridCell>> cells_aside(const Cells& cells, GridCell here, i64 within, i64 spacing) {
     const auto shape = cells.part_of_cell.shape;
-    const GridCell here{floor_div(from.y, SUB), floor_div(from.x, SUB)};
-    const GridCell low{std::max<i64>(here.row - search.within, 0), std::max<i64>(here.column - search.within, 0)};
-    const GridCell high{std::min(here.row + search.within + 1, shape[0]),
-                        std::min(here.column + search.within + 1, shape[1])};
+    const GridCell low{std::max<i64>(here.row - within, 0), std::max<i64>(here.column - within, 0)};
+    const GridCell high{std::min(here.row + within + 1, shape[0]), std::min(here.column + within + 1, shape[1])};
     auto open =
         Array<bool, 2>::empty({std::max<i64>(high.row - low.row, 0), std::max<i64>(high.column - low.column, 0)});
     for (i64 r = low.row; r < high.row; ++r) {
@@ -259,33 +261,47 @@ std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end
     const i64 goal[] = {here.row - low.row, here.column - low.column};
     const auto steps = walking_distance(open, {goal, {1, 2}});
     std::vector<std::pair<i32, GridCell>> found;
-    const auto first_from = [&](i64 number) { return -floor_div(-number, search.spacing) * search.spacing; };
-    for (i64 r = first_from(low.row); r < high.row; r += search.spacing) {
-        for (i64 c = first_from(low.column); c < high.column; c += search.spacing) {
+    const auto first_from = [&](i64 number) { return -floor_div(-number, spacing) * spacing; };
+    for (i64 r = first_from(low.row); r < high.row; r += spacing) {
+        for (i64 c = first_from(low.column); c < high.column; c += spacing) {
             const i32 away = steps.view()(r - low.row, c - low.column);
             if (away > 0) found.push_back({away, {r, c}});
         }
     }
     std::ranges::stable_sort(found, {}, [](const auto& place) { return place.first; });
+    return found;
+}
+
+}  // namespace
+
+std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end, const Cells& cells, Point from,
+                                const Search& search, View<const i64> reach) {
+    const GridCell here{floor_div(from.y, SUB), floor_div(from.x, SUB)};
     std::vector<std::pair<Point, i64>> others;  // where somebody will be, and how near they may come
     for (i64 body = 0; body < timelines.bodies(); ++body) {
-        for (i64 at = step; body != row && at <= end; ++at) {
-            const BodyPose pose = timelines.pose(body, at);
-            const std::pair other{Point{pose.x, pose.y}, reach[body]};
-            if (pose.away == 0 && (others.empty() || others.back() != other)) others.push_back(other);
+        if (body == row) continue;
+        const OwnedWindow window = timelines.window(body, body + 1, step, end + 1);
+        for (std::size_t run = 0; run < window.step.size(); ++run) {
+            const std::pair other{Point{window.x[run], window.y[run]}, reach[body]};
+            if (window.away[run] == 0 && (others.empty() || others.back() != other)) others.push_back(other);
         }
     }
-    std::vector<Point> places;
-    for (const auto& [away, cell] : found) {
-        if (static_cast<i64>(places.size()) == search.most) break;
-        const Point place{cell.column * SUB + CELL_CENTRE, cell.row * SUB + CELL_CENTRE};
-        const bool is_clear = std::ranges::all_of(others, [&](const auto& other) {
-            const i64 dx = place.x - other.first.x, dy = place.y - other.first.y;
-            return dx * dx + dy * dy > other.second * other.second;
-        });
-        if (is_clear) places.push_back(place);
+    // Mostly there are enough places nearby.
+    for (i64 within = std::min(search.within, FIRST_ASIDE);; within = std::min(2 * within, search.within)) {
+        const bool is_last = within == search.within;
+        std::vector<Point> places;
+        for (const auto& [away, cell] : cells_aside(cells, here, within, search.spacing)) {
+            if (static_cast<i64>(places.size()) == search.most) break;
+            if (!is_last && away > within * STRAIGHT_STEP) break;  // a shorter way might lead outside
+            const Point place{cell.column * SUB + CELL_CENTRE, cell.row * SUB + CELL_CENTRE};
+            const bool is_clear = std::ranges::all_of(others, [&](const auto& other) {
+                const i64 dx = place.x - other.first.x, dy = place.y - other.first.y;
+                return dx * dx + dy * dy > other.second * other.second;
+            });
+            if (is_clear) places.push_back(place);
+        }
+        if (is_last || static_cast<i64>(places.size()) == search.most) return places;
     }
-    return places;
 }
 
 std::vector<Disc> standing(Timelines& timelines, i64 row, i64 step, i64 steps, View<const i64> reach) {

@@ -45,19 +45,19 @@ i64 next_stop(const TrackPiece& track, i64 moment, const std::function<bool(Poin
 
 // The first of some waits after which a body may go on as it planned.
 //
-// It stands from step `step` on for so many steps, and meets nobody in the steps up to `end` - 1. All distances are
-// those of row 0.
-std::optional<Detour> way_after_a_wait(Timelines& timelines, i64 row, i64 step, View<const i64> waits,
-                                       const Distances& distances, i64 end);
+// It stands from step `step` on for so many steps, and meets nobody on the known ways, which begin at that step. All
+// distances are those of row 0.
+std::optional<Detour> way_after_a_wait(Timelines& timelines, const KnownWays& ways, i64 row, i64 step,
+                                       View<const i64> waits, const Distances& distances);
 
 // The way by the first of some places from which a body may go on.
 //
 // It goes there, stays for the first of `waits` that lets it go on, and goes on with the first stop after the step
-// `met` in which somebody would be in its way. Where it could stay until `end`, but is free after none of the waits, it
-// stays for `rests` steps; 0: it doesn't, and looks at the whole way only.
-std::optional<Detour> way_by_a_place(Timelines& timelines, const Yielder& body, i64 step, i64 met,
-                                     View<const i64, 2> places, View<const i64> waits, i64 rests,
-                                     const Distances& distances, i64 end);
+// `met` in which somebody would be in its way. Where it could stay for as long as ways are known, but is free after
+// none of the waits, it stays for `rests` steps; 0: it doesn't, and looks at the whole way only.
+std::optional<Detour> way_by_a_place(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step,
+                                     i64 met, View<const i64, 2> places, View<const i64> waits, i64 rests,
+                                     const Distances& distances);
 
 // The way round some discs to the first stop after the moment `met`, from which it goes on. If that stop is taken by a
 // disc, it stops at the place that `beside` returns instead; nothing if that is none.

@@ -101,13 +101,15 @@ bool is_far(const Straight& body, const Straight& other, i64 begin, i64 end, i64
 
 // The first step in which two bodies meet, -1 for none. Each step is looked at by itself, as what is rounded must not
 // depend on where the ways begin.
-i64 first_meeting_step(const Way& body, const Way& other, const MeetingLimits& limits, i64 step_us) {
+i64 first_meeting_step(const Way& body, const Way& other, const MeetingLimits& limits, i64 first_us, i64 end_us,
+                       i64 step_us) {
     const i64 limit = std::max(limits.near, limits.hard);
     if (!body.is_near(other, limit)) return -1;
-    auto a = body.straights.begin();
-    auto b = other.straights.begin();
+    auto a = body.from(first_us);
+    auto b = other.from(first_us);
     while (a != body.straights.end() && b != other.straights.end()) {
-        const i64 begin = std::max(a->begin, b->begin), end = std::min(a->end, b->end);
+        const i64 begin = std::max({a->begin, b->begin, first_us}), end = std::min({a->end, b->end, end_us});
+        if (begin >= end_us) return -1;
         const bool counts = begin < end && !a->away && !b->away && !is_far(*a, *b, begin, end, limit);
         const bool rest = a->whole == 0 && b->whole == 0;
         for (i64 from = begin; counts && from < end;) {
@@ -115,21 +117,24 @@ i64 first_meeting_step(const Way& body, const Way& other, const MeetingLimits& l
             if (do_meet(*a, *b, from, until, limits)) return floor_div(from, step_us);
             from = until;
         }
-        if (a->end == end) ++a;
-        if (b->end == end) ++b;
+        const i64 next = std::min(a->end, b->end);
+        if (a->end == next) ++a;
+        if (b->end == next) ++b;
     }
     return -1;
 }
 
-std::optional<Meeting> first_meeting(const std::vector<Way>& ways, const Way& way, i64 row, i64 number,
-                                     const Distances& distances, i64 first, i64 end, i64 step_us) {
+// The first meeting of a body that is due, where `first_step` returns the first step in which it meets another one.
+template <class FirstStep>
+std::optional<Meeting> first_meeting(i64 row, i64 number, const Distances& distances, i64 first, i64 end,
+                                     const FirstStep& first_step) {
     std::optional<Meeting> best;
-    for (i64 other = 0; other < static_cast<i64>(ways.size()); ++other) {
+    for (i64 other = 0; other < distances.lead.shape[1]; ++other) {
         const i64 lead = distances.lead(number, other);
         if (other == row || lead < 0) continue;
         const MeetingLimits limits{distances.near(number, other), distances.hard(number, other),
                                    static_cast<MotionCounts>(distances.counts(number, other))};
-        const i64 step = first_meeting_step(way, ways[number_of(other)], limits, step_us);
+        const i64 step = first_step(other, limits);
         if (step < 0) continue;
         const i64 due = std::max(first, step - lead);
         if (due >= end) continue;
@@ -146,31 +151,70 @@ i64 longest_lead(const Distances& distances) {
     return longest;
 }
 
-std::vector<Way> ways_of(Timelines& timelines, i64 first, i64 end) {
-    std::vector<Way> ways;
-    for (i64 body = 0; body < timelines.bodies(); ++body) ways.push_back(way_of(timelines, body, first, end));
-    return ways;
-}
-
 }  // namespace
 
-KnownWays::KnownWays(Timelines& timelines, i64 first, i64 end)
-    : first_(first), end_(end), step_us_(timelines.step_us()), ways_(ways_of(timelines, first, end)) {}
-
-std::optional<Meeting> KnownWays::meeting(i64 row, const TrackPiece& track, const Distances& distances) const {
-    Way way;
-    add_track(track, first_ * step_us_, end_ * step_us_, way);
-    return first_meeting(ways_, way, row, 0, distances, first_, end_, step_us_);
+void KnownWays::update(Timelines& timelines, i64 first, i64 end) {
+    const bool is_same = first == first_ && end == end_;
+    first_ = first, end_ = end, step_us_ = timelines.step_us();
+    ways_.resize(number_of(timelines.bodies()));
+    changes_.resize(ways_.size(), -1);
+    for (i64 body = 0; body < timelines.bodies(); ++body) {
+        const std::size_t i = number_of(body);
+        if (is_same && changes_[i] == timelines.changes(body)) continue;
+        ways_[i] = fleet2d::way_of(timelines, body, first, end);
+        changes_[i] = timelines.changes(body);
+    }
 }
 
-std::vector<Meeting> meetings(Timelines& timelines, View<const i64> rows, const Distances& distances, i64 first,
-                              i64 end) {
-    const std::vector<Way> ways = ways_of(timelines, first, end + longest_lead(distances));
+std::optional<Meeting> KnownWays::meeting(i64 row, const TrackPiece& track, const Distances& distances) const {
+    const i64 first_us = first_ * step_us_, end_us = end_ * step_us_;
+    Way way;
+    add_track(track, first_us, end_us, way);
+    return first_meeting(row, 0, distances, first_, end_, [&](i64 other, const MeetingLimits& limits) {
+        return first_meeting_step(way, ways_[number_of(other)], limits, first_us, end_us, step_us_);
+    });
+}
+
+const Way& MeetingSearch::way_of(Timelines& timelines, i64 body, i64 first, i64 end) {
+    KnownWay& known = ways_[number_of(body)];
+    const i64 changes = timelines.changes(body);
+    if (known.changes != changes || first < known.first || end > known.end) {
+        known = {changes, first, end, fleet2d::way_of(timelines, body, first, end)};
+    }
+    return known.way;
+}
+
+i64 MeetingSearch::first_step(Timelines& timelines, i64 row, i64 other, const KnownMeeting& wanted) {
+    KnownMeeting& known = known_[number_of(row * timelines.bodies() + other)];
+    const bool is_same = known.changes == wanted.changes && known.other_changes == wanted.other_changes &&
+                         known.near == wanted.near && known.hard == wanted.hard && known.counts == wanted.counts &&
+                         known.first <= wanted.first;
+    if (is_same && known.step >= wanted.first) return known.step < wanted.end ? known.step : -1;
+    if (is_same && known.step < 0 && wanted.end <= known.end) return -1;
+    const bool goes_on = is_same && known.step < 0 && wanted.first <= known.end;
+    const i64 from = goes_on ? known.end : wanted.first, step_us = timelines.step_us();
+    const MeetingLimits limits{wanted.near, wanted.hard, static_cast<MotionCounts>(wanted.counts)};
+    const Way& way = way_of(timelines, row, from, wanted.end);
+    known = wanted;
+    known.step = first_meeting_step(way, way_of(timelines, other, from, wanted.end), limits, from * step_us,
+                                    wanted.end * step_us, step_us);
+    return known.step;
+}
+
+std::vector<Meeting> MeetingSearch::run(Timelines& timelines, View<const i64> rows, const Distances& distances,
+                                        i64 first, i64 end) {
+    ways_.resize(number_of(timelines.bodies()));
+    known_.resize(ways_.size() * ways_.size());
+    const i64 until = end + longest_lead(distances);
     std::vector<Meeting> result;
     for (i64 number = 0; number < rows.size(); ++number) {
         const i64 row = rows[number];
         const auto found =
-            first_meeting(ways, ways[number_of(row)], row, number, distances, first, end, timelines.step_us());
+            first_meeting(row, number, distances, first, end, [&](i64 other, const MeetingLimits& limits) {
+                return first_step(timelines, row, other,
+                                  {timelines.changes(row), timelines.changes(other), limits.near, limits.hard,
+                                   limits.counts, first, until, -1});
+            });
         if (found) result.push_back(*found);
     }
     return result;

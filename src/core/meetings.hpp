@@ -4,6 +4,7 @@
 // meet when the distance of their middles falls below a limit while they approach, or when they overlap and don't part.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -33,11 +34,6 @@ struct Distances {
     View<const i64, 2> hard;   // distance below which they overlap, and must part [lattice units]; 0: they needn't
     View<const u8, 2> counts;  // whose motion counts: a MotionCounts
 };
-
-// For each of some bodies, the first meeting that is due in the steps first to end - 1; of several that are due at a
-// step, the earliest, and then that with the lowest row. Bodies without one are left out.
-std::vector<Meeting> meetings(Timelines& timelines, View<const i64> rows, const Distances& distances, i64 first,
-                              i64 end);
 
 // A straight stretch of a way, from one moment to another.
 struct Straight {
@@ -71,6 +67,10 @@ struct Way {
         x1 = std::max({x1, straight.at.x, straight.at.x + straight.dx});
         y1 = std::max({y1, straight.at.y, straight.at.y + straight.dy});
     }
+    // The first straight that isn't over at a moment.
+    std::vector<Straight>::const_iterator from(i64 moment) const {
+        return std::ranges::upper_bound(straights, moment, {}, &Straight::end);
+    }
     bool is_near(const Way& other, i64 distance) const {
         return x0 <= x1 && other.x0 <= other.x1 && x0 - distance <= other.x1 && other.x0 - distance <= x1 &&
                y0 - distance <= other.y1 && other.y0 - distance <= y1;
@@ -80,15 +80,46 @@ struct Way {
 // The ways of all bodies over some steps, as far as they are known.
 class KnownWays {
 public:
-    KnownWays(Timelines& timelines, i64 first, i64 end);
+    // Take in the ways over the steps first to end - 1. Those that are known already are kept.
+    void update(Timelines& timelines, i64 first, i64 end);
 
     // Whom a body would meet first if it followed a track from the first step on. All distances are those of row 0, and
     // no lead is above 0.
     std::optional<Meeting> meeting(i64 row, const TrackPiece& track, const Distances& distances) const;
 
 private:
-    i64 first_, end_, step_us_;
+    i64 first_ = 0, end_ = 0, step_us_ = 1;
     std::vector<Way> ways_;
+    std::vector<i64> changes_;  // of each body, when its way was taken in
+};
+
+// Looks for meetings again and again, as time goes on and bodies change their ways. What is known of two bodies that
+// didn't is kept.
+class MeetingSearch {
+public:
+    // For each of some bodies, the first meeting that is due in the steps first to end - 1; of several that are due at
+    // a step, the earliest, and then that with the lowest row. Bodies without one are left out.
+    std::vector<Meeting> run(Timelines& timelines, View<const i64> rows, const Distances& distances, i64 first,
+                             i64 end);
+
+private:
+    // The way of a body in some steps, at least.
+    struct KnownWay {
+        i64 changes = -1, first = 0, end = 0;
+        Way way;
+    };
+    // Where two bodies meet first in some steps; -1 for nowhere.
+    struct KnownMeeting {
+        i64 changes = -1, other_changes = -1;
+        i64 near = 0, hard = 0, counts = 0;
+        i64 first = 0, end = 0, step = -1;
+    };
+
+    const Way& way_of(Timelines& timelines, i64 body, i64 first, i64 end);
+    i64 first_step(Timelines& timelines, i64 row, i64 other, const KnownMeeting& wanted);
+
+    std::vector<KnownWay> ways_;
+    std::vector<KnownMeeting> known_;  // of body b and other o: number b * bodies + o
 };
 
 }  // namespace fleet2d

@@ -140,6 +140,7 @@ void Timelines::put(i64 body, Piece piece) {
     auto& pieces = bodies_[index(body)];
     while (!pieces.empty() && pieces.back().first >= piece.first) pieces.pop_back();
     pieces.push_back(std::move(piece));
+    ++changes_[index(body)];
 }
 
 const Piece& Timelines::piece_at(i64 body, i64 step) const {

@@ -76,11 +76,14 @@ struct Piece {
 
 class Timelines {
 public:
-    Timelines(i64 bodies, i64 step_us) : step_us_(step_us), bodies_(static_cast<std::size_t>(bodies)) {}
+    Timelines(i64 bodies, i64 step_us)
+        : step_us_(step_us), bodies_(static_cast<std::size_t>(bodies)), changes_(bodies_.size()) {}
 
     i64 bodies() const { return static_cast<i64>(bodies_.size()); }
     i64 step_us() const { return step_us_; }
     const std::vector<Piece>& pieces(i64 body) const { return bodies_[static_cast<std::size_t>(body)]; }
+    // How often a body has begun to do something else.
+    i64 changes(i64 body) const { return changes_[static_cast<std::size_t>(body)]; }
 
     // From a step on, let a body do what a piece says; it replaces what the body would have done from then on.
     void put(i64 body, Piece piece);
@@ -96,6 +99,7 @@ private:
 
     i64 step_us_;
     std::vector<std::vector<Piece>> bodies_;
+    std::vector<i64> changes_;
 };
 
 }  // namespace fleet2d

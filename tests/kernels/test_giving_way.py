@@ -234,7 +234,7 @@ def test_places_aside_are_the_nearest_that_nobody_comes_near_to() -> None:
     for random, timelines, _, step in scenes(40):
         parts = random.integers(0, 8, (64, 64)).clip(0, 1).astype(np.int32)
         start = tuple(random.integers(700, 3000, 2).tolist())
-        search = int(random.integers(3, 20)), 2, 5
+        search = int(random.integers(3, 40)), 2, 5
         reach = np.array([0, 900, 1500])
         poses = timelines.poses(np.arange(step, step + 6))
         ways = [(poses[:, body, :2], int(reach[body])) for body in (1, 2)]

@@ -1,5 +1,7 @@
 """When bodies come too near to each other, against looking at many moments of each step."""
 
+import copy
+
 import numpy as np
 from tests.reference.meetings import Way, first_meeting
 from tests.thorough import examples
@@ -79,3 +81,34 @@ def test_a_meeting_is_the_same_from_wherever_it_is_looked_for() -> None:
             assert step == -1 or step >= first
             if first and steps[first - 1] >= first:
                 assert steps[first - 1] == step
+
+
+def test_what_was_found_before_is_not_said_of_other_ways_times_or_distances() -> None:
+    """Timelines remember what they found; a copy of them has found nothing yet."""
+    random = np.random.default_rng(11)
+    rows = np.arange(3)
+    met = 0
+    for _ in range(30):
+        timelines = follow([random_track(random, 2500)[0] for _ in range(3)])
+        kept = distances_of_three(random)
+        first = 0
+        for _ in range(20):
+            if random.random() < 0.3:
+                track = random_track(random, 2500)[0]
+                timelines.follow(int(random.integers(0, 3)), first, track, np.zeros(0, np.int64), np.zeros(1, np.int8))  # fmt: skip
+            if random.random() < 0.2:
+                kept = distances_of_three(random)
+            end = first + int(random.integers(0, STEPS))
+            fresh = copy.copy(timelines)
+            found = timelines.meetings(rows, kept, first, end)
+            met += len(found)
+            assert found == fresh.meetings(rows, kept, first, end)
+            own = Distances(*(part[:1] for part in kept._replace(lead=kept.lead * 0)))
+            assert timelines.meeting_at_rest(0, own, first, end) == fresh.meeting_at_rest(0, own, first, end)  # fmt: skip
+            first = max(0, first + int(random.integers(-1, 3)))
+    assert met > 100
+
+
+def distances_of_three(random: np.random.Generator) -> Distances:
+    lead, near, hard = (random.integers(0, most, (3, 3)) for most in (6, 600, 500))
+    return Distances(lead - 1, near, hard, random.integers(0, 3, (3, 3)).astype(np.uint8))

@@ -124,7 +124,7 @@ public:
         check_meetings(rows.size(), distances, first, end);
         for (const i64 row : rows) check(row, first);
         Rows result;
-        for (const auto& [row, due, step, other] : fleet2d::meetings(timelines_, rows, distances, first, end)) {
+        for (const auto& [row, due, step, other] : search_.run(timelines_, rows, distances, first, end)) {
             result.emplace_back(row, due, step, other);
         }
         return result;
@@ -133,7 +133,7 @@ public:
     std::tuple<i64, i64> meeting_on(i64 row, const Breakpoints& track, const Distances& distances, i64 first, i64 end) {
         check_meetings(1, distances, first, end);
         check(row, first);
-        const auto found = KnownWays(timelines_, first, end).meeting(row, piece_of(track), distances);
+        const auto found = known_ways(first, end).meeting(row, piece_of(track), distances);
         return found ? std::tuple(found->step, found->other) : std::tuple(i64{-1}, i64{-1});
     }
 
@@ -143,7 +143,7 @@ public:
         const BodyPose at = timelines_.pose(row, first);
         const TrackPiece rest{{first * timelines_.step_us()}, {at.x}, {at.y}, {at.heading},
                               {static_cast<u8>(at.away)},     {},     {0}};
-        const auto found = KnownWays(timelines_, first, end).meeting(row, rest, distances);
+        const auto found = known_ways(first, end).meeting(row, rest, distances);
         return found ? std::tuple(found->step, found->other) : std::tuple(i64{-1}, i64{-1});
     }
 
@@ -159,7 +159,7 @@ public:
 
     DetourFields way_after_a_wait(i64 row, i64 step, View<const i64> waits, const Distances& distances, i64 end) {
         check_detour(row, step, waits, distances, end);
-        return fields_of(fleet2d::way_after_a_wait(timelines_, row, step, waits, distances, end));
+        return fields_of(fleet2d::way_after_a_wait(timelines_, known_ways(step, end), row, step, waits, distances));
     }
 
     DetourFields way_by_a_place(const YielderFields& body, i64 step, i64 met, View<const i64, 2> places,
@@ -171,7 +171,8 @@ public:
         require(places.shape[1] == 2 && all_in_range(places, -FARTHEST_POSE + 1, FARTHEST_POSE),
                 "places must be (n, 2), within 2**29 of 0");
         const Yielder yielder = yielder_of(body);
-        return fields_of(fleet2d::way_by_a_place(timelines_, yielder, step, met, places, waits, rests, distances, end));
+        return fields_of(fleet2d::way_by_a_place(timelines_, known_ways(step, end), yielder, step, met, places, waits,
+                                                 rests, distances));
     }
 
     DetourFields way_round(const YielderFields& body, i64 step, i64 met, View<const i64, 2> discs,
@@ -406,7 +407,15 @@ private:
         walk.x = copied(x), walk.y = copied(y), walk.heading = copied(heading);
     }
 
+    const KnownWays& known_ways(i64 first, i64 end) {
+        KnownWays& ways = first < end ? ways_ : no_ways_;
+        ways.update(timelines_, first, end);
+        return ways;
+    }
+
     Timelines timelines_;
+    KnownWays ways_, no_ways_;  // of the steps that were asked for last, and of none
+    MeetingSearch search_;
     std::vector<nb::object> meshes_;
 };
 

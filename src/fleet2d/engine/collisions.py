@@ -80,10 +80,7 @@ class BlockedWays(Watcher):
         """Whether bodies block each other."""
         return bool(self.steered)
 
-    @property
-    def waits(self) -> bool:
-        """Whether bodies block each other."""
-        return self.is_needed
+    waits = is_needed
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a body has to decide: not the first of the span."""
@@ -227,10 +224,7 @@ class Clearance(Watcher):
         """Whether any robot gives way."""
         return bool(self.robots)
 
-    @property
-    def waits(self) -> bool:
-        """Whether any robot gives way."""
-        return self.is_needed
+    waits = is_needed
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a robot has to decide: not the first of the span."""

@@ -120,10 +120,7 @@ class Conversations(Watcher):
         """Whether any robot wants something of people."""
         return bool(self.queues)
 
-    @property
-    def waits(self) -> bool:
-        """Whether any robot wants something of people."""
-        return self.is_needed
+    waits = is_needed
 
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
         """Record the completed part of a plan that is replaced at a step."""

@@ -167,10 +167,7 @@ class Encounters(Watcher):
         """Whether any person reacts to robots."""
         return bool(self.pairs)
 
-    @property
-    def waits(self) -> bool:
-        """Whether any person reacts to robots."""
-        return self.is_needed
+    waits = is_needed
 
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
         """Record the calls at `step` of a robot's plan that is replaced."""

@@ -65,8 +65,6 @@ ASIDE_TRIES = 12
 VIAS = 8
 
 
-# How many steps it looks for meetings at once.
-FORESIGHT = 3600
 NO_WAIT = np.zeros(1, np.int64)
 
 # Whose motion counts.
@@ -139,7 +137,6 @@ class Yielding(Watcher):
         self._swapped: dict[tuple[int, int], int] = {}
         self._stuck: tuple[bool, ...] = ()
         self._distances: Distances | None = None
-        self._foreseen = (-1, 0, 0)  # at a step: nobody reacts before another one, or the end
         self.overlaps: dict[tuple[str, str], int] = {}
         if self.rows:
             self._set_up()
@@ -149,10 +146,7 @@ class Yielding(Watcher):
         """Whether any robot yields."""
         return bool(self.rows)
 
-    @property
-    def waits(self) -> bool:
-        """Whether any robot yields."""
-        return self.is_needed
+    waits = is_needed
 
     @property
     def notes(self) -> list[str]:
@@ -164,16 +158,8 @@ class Yielding(Watcher):
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step at which a robot has to react: not the first of the span."""
-        step, due, until = self._foreseen
-        if step != self.next_step:
-            due = until = self.next_step + 1
-        if due < until or end <= until:
-            return min(due, end)
-        return self._next_due(until, end)
-
-    def _next_due(self, first: int, end: int) -> int:
-        """Return the first step at which a robot has to react to somebody; `end` for none."""
         step = self.next_step
+        first = step + 1
         while first < end:
             changes = list(self._changes())
             until = min([end, *(change for change in changes if change > first)])
@@ -210,17 +196,7 @@ class Yielding(Watcher):
             end_plan: Called with a row and the step before its plan is replaced.
         """
         self._refresh(step)
-        kept = self._present(step)
-        until = max(min(step + FORESIGHT, self._bodies.next_decision()), step + 1)
-        if self._patience or self._pauses or self._swapped:
-            until = min(until, *self._changes())
-        found = self._meetings(kept, step, until)
-        if not found:
-            self._foreseen = step, until, until
-            return
-        first = min(due for _, due, _, _ in found)
-        self._foreseen = (step if first > step else -1, first, until)
-        found = [meeting for meeting in found if meeting[1] == step]
+        found = self._meetings(self._present(step), step, step + 1)
         for row, _, at, other in found:
             now = Situation(self._actors[row], step, (), outputs)
             for each, plan in self._plans(now, at, other):
@@ -261,6 +237,8 @@ class Yielding(Watcher):
         self._near = lattice(PASSING_GAP_M)
         self._least = lattice(LEAST_GAP_M)
         self._nothing = np.zeros_like(self._near)
+        self._strangers = np.zeros_like(self._near[:1])  # those who don't yield
+        self._strangers[:, self._rows] = -1
         self._reach = self._near + SUB  # with room to move
         self._alone = np.full(touch.shape, OWN, np.uint8)
         both = np.zeros_like(self._alone)
@@ -420,7 +398,7 @@ class Yielding(Watcher):
             return [passing]
         else:
             plan = self._aside(now, at, self._politely[row])
-            if plan is None and self._is_polite(row):
+            if plan is None and self._counts[self._number[row]].any():  # then less politely
                 plan = self._aside(now, at, self._passing[row])
         if plan is None:
             plan = self._in_vain(now, at, other, stays)
@@ -502,10 +480,6 @@ class Yielding(Watcher):
         plan = self._by_via(theirs, at, row)
         return None if plan is None else (theirs, self._noted(theirs, row, plan))
 
-    def _is_polite(self, row: int) -> bool:
-        """Return whether a robot keeps clear of people that stand by its own `gives_way`."""
-        return getattr(self._actors[row].entity, "gives_way", None) is not None
-
     def _beside(self, actor: DecidingActor, other: int) -> I64:
         """Return points by which a robot may pass a body that stands, the nearest but one first."""
         near = 3 * int(self._polite[self._number[actor.row], other]) // 2
@@ -523,13 +497,17 @@ class Yielding(Watcher):
         cell = actor.home.plan.lattice.cell
         rests = self._steps(FREE_FOR)
         reach = self._near[self._number[actor.row]] + SUB
+        places: I64 | None = None
         for metres in (NEAR_M, FAR_M):
             search = int(metres / cell), ASIDE_CELLS, ASIDE_TRIES
             place = self._inside(actor)
             grid = actor.space.part_of_cell, actor.part
+            tried = places
             places = self._bodies.timelines.places_aside(
                 actor.row, now.step, now.step + rests, *grid, place, search, reach
             )
+            if tried is not None and np.array_equal(places, tried):
+                break
             plan = self._by_places(now, at, places, self._tries_aside, rests, kept)
             if plan is not None:
                 return plan
@@ -581,17 +559,19 @@ class Yielding(Watcher):
 
     def _hits(self, now: Situation) -> list[int]:
         """Return who doesn't yield and walks into a robot in this step, if it stands still."""
-        hits = []
-        kept = self._everybody[now.actor.row]
-        for other in range(len(self._actors)):
-            if other in self._number:
-                continue
-            only = np.full_like(kept.lead, -1)
-            only[:, other] = 0
-            met = self._hit_at_rest(now, kept._replace(lead=only))
-            if met is not None and met[0] == now.step:
-                hits.append(other)
-        return hits
+        row = now.actor.row
+        kept = self._everybody[row]
+        meeting_at_rest = self._bodies.timelines.meeting_at_rest
+        hits = list[int]()
+        lead = self._strangers
+        while True:  # mostly it is nobody
+            only = kept._replace(lead=lead)
+            _, other = meeting_at_rest(row, only, now.step, now.step + 1)
+            if other < 0:
+                return hits
+            hits.append(other)
+            lead = lead.copy()
+            lead[0, other] = -1
 
     def _noted(self, now: Situation, other: int, plan: Plan) -> Plan:
         """Add to a plan that the robot gives way, at the beginning of a wait."""
@@ -683,7 +663,7 @@ class Yielding(Watcher):
 
     def _stop_of(self, actor: DecidingActor, step: int) -> LatticePoint | None:
         """Return where a body stops after a step, or is; None if it walks at random."""
-        motion = actor.plan.finish()
+        motion = actor.motion
         if not isinstance(motion, Track):
             return None
         track = motion.breakpoints
@@ -762,7 +742,7 @@ def _charger(actor: DecidingActor) -> LatticePoint | None:
 
 
 def _goes_somewhere(actor: DecidingActor) -> bool:
-    motion = actor.plan.finish()
+    motion = actor.motion
     if not isinstance(motion, Track):
         return True
     track = motion.breakpoints

@@ -28,7 +28,6 @@ from fleet2d.kernels import (
     I64,
     SUB,
     TURN,
-    Bool,
     Breakpoints,
     Continued,
     Delay,
@@ -278,11 +277,6 @@ class RoutesAround:
     def __init__(self, body: Body, people: I64) -> None:
         self._body = body
         self.people = people
-
-    def clear(self, points: I64) -> Bool:
-        """Return which of some points, int64 (n, 2), are far enough from all of them."""
-        away = points[:, None] - self.people[:, :2]
-        return ((away * away).sum(axis=2) > self.people[:, 2] ** 2).all(axis=1)
 
     @cached_property
     def cost(self) -> I32:
