@@ -8,6 +8,7 @@ import pytest
 from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, run, small
 
+import fleet2d.studies.plan as plans
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.design import _LEAVES, build_design, code_version, input_hash
@@ -111,6 +112,20 @@ def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
     assert 8 == len(setups)  # of 32 combinations
     for column in (SPEED, "robots.astro.radius"):
         assert 8 == len({(row["home"], row[column]) for row in setups})
+
+
+def test_of_a_fleet_the_first_homes_are_set_up_before_its_first_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(plans, "FLEET_HOMES", 2)
+    lives = {"population": 4, "homes": [{"synthetic": 40}]}
+    study_plan = plan(axes={"robot": lives, SPEED: [0.1, 0.2]}, replicates=1)
+    assert 4 == study_plan.variants["home_key"].n_unique()
+
+    checked = study_plan.variants[setups_to_check(study_plan)]
+
+    assert 4 == len(checked)  # each of two homes with each speed
+    assert 2 == checked["home_key"].n_unique()
 
 
 def test_two_variants_with_the_same_scenario_are_refused() -> None:

@@ -42,7 +42,7 @@ from fleet2d.studies.executors import (
     WorkerTask,
     run_tasks,
 )
-from fleet2d.studies.population import MAX_PROBLEMS, raise_problems
+from fleet2d.studies.population import MAX_PROBLEMS, FleetLives, raise_problems
 from fleet2d.studies.results import VARIANT
 from fleet2d.studies.simulator import check_setup, is_kept
 from fleet2d.studies.specification import SEED, Specification
@@ -56,6 +56,8 @@ LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")  # tables of
 SLICE_ROWS = 5_000  # variants whose results are in memory at a time
 SCENARIO_ROWS = 1_000  # scenarios that are in memory at a time
 FEW_SETUPS = 8  # up to here starting workers costs more than it saves
+FLEET_HOMES = 100
+"""Homes of a fleet that are set up before its first run: all of its lives are drawn by one law."""
 
 
 class StudyPlan(NamedTuple):
@@ -250,13 +252,16 @@ def setups_to_check(plan: StudyPlan) -> list[int]:
     """Return the places of variants in which each home meets each choice of every other axis.
 
     Their set-up shows people and robots that have no room where they start, without setting up
-    every variant.
+    every variant. Of a fleet the first homes are enough: a later life that has no room fails by
+    itself.
     """
     seeds = len(plan.design.seeds)
     homes: dict[str, list[int]] = {}
     for number, home in enumerate(plan.variants["home_key"].gather_every(seeds)):
         homes.setdefault(home, []).append(number)
-    chosen = (_covering(plan.design, np.array(numbers)) for numbers in homes.values())
+    is_fleet = any(isinstance(axis.choices, FleetLives) for axis in plan.design.axes)
+    checked = itertools.islice(homes.values(), FLEET_HOMES if is_fleet else None)
+    chosen = (_covering(plan.design, np.array(numbers)) for numbers in checked)
     return [number * seeds for number in itertools.chain.from_iterable(chosen)]
 
 
