@@ -471,6 +471,30 @@ def test_bundled_home_written_as_geojson_comes_back_equal(tmp_path: Path) -> Non
     assert plan == load_floorplan(path)
 
 
+@pytest.mark.parametrize("seed", [3, 4])
+def test_synthetic_home_written_as_geojson_comes_back_with_its_front_door(
+    tmp_path: Path, seed: int
+) -> None:
+    """It stands across its sill, behind which the plan ends, and stayed shut."""
+    plan = load_floorplan(f"synthetic:{seed}")
+    path = write(tmp_path)
+    path.write_text(json.dumps(geojson_document(plan)))
+
+    again = load_floorplan(path)
+
+    assert () == again.notes
+    assert plan.doorways == again.doorways
+    assert plan.free_space.equals(again.free_space)
+
+
+@pytest.mark.parametrize("y", [0.0, 0.1])
+def test_door_along_an_outer_wall_of_free_space_leads_outside(tmp_path: Path, y: float) -> None:
+    plan = read(tmp_path, feature(box(0, 0, 5, 4), "free"), feature(line((1, y), (2, y)), "door"))
+
+    assert () == plan.doorways
+    assert "leads outside" in plan.notes[0]
+
+
 # --- As a component, and wrong files ----------------------------------------------------------------
 
 

@@ -37,6 +37,7 @@ from fleet2d.homes.formats.passages import (
     door_axes,
     find_passage,
     shared_borders,
+    spans_free_space,
 )
 from fleet2d.kernels import F64
 from fleet2d.runtime.determinism import sum_in_order
@@ -280,7 +281,10 @@ class Draft:
                 self.features[number] = replace(feature, shape=line)
 
     def _cut_doors(self) -> None:
-        """Open the walls where doors are; a door that leads outside stays shut."""
+        """Open the walls where doors are; a door that leads outside stays shut.
+
+        A door across space that the file calls free is open, though only a sill may be behind it.
+        """
         cuts: list[Polygon] = []
         for feature, passages in self._passages("door", "opening"):
             through = next((p for p in passages if p.through), None)
@@ -294,8 +298,13 @@ class Draft:
                 self.doors.append((feature, through))
                 cuts += [through.opening] if through.halves else []
             elif passages:
-                self.ways_out.append((feature, passages[0]))
-                self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
+                way_out = passages[0]
+                self.ways_out.append((feature, way_out))
+                if self._of("free") and spans_free_space(self.free, way_out.start, way_out.end):
+                    across = Passage(way_out.start, way_out.end, 0.0, 0.0, True)
+                    self.doors.append((feature, across))
+                else:
+                    self.notes.append(f"the {feature.kind} {name} leads outside: it stays shut")
             else:
                 self.notes.append(f"the {feature.kind} {name} is in no room's wall: ignored")
         self.free = multi(shapely.union_all([self.free, *cuts]))

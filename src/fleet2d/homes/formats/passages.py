@@ -135,6 +135,15 @@ def find_passage(free: MultiPolygon, start: Point, end: Point) -> Passage | None
     return Passage(start, end, low, high, True)
 
 
+def spans_free_space(free: MultiPolygon, start: Point, end: Point) -> bool:
+    """Return whether a door stands in free space from wall to wall."""
+    middle = LineString([start, end]).centroid
+    jambs = shapely.points([start, end])
+    walls = free.boundary
+    at_walls = bool((shapely.distance(walls, jambs) <= TOUCH_M).all())
+    return at_walls and bool(free.contains(middle)) and walls.distance(middle) > TOUCH_M
+
+
 def shared_borders(rooms: Sequence[MultiPolygon]) -> list[LineString]:
     """Return the lines along which rooms touch one another, side by side, but for noise."""
     borders: list[BaseGeometry] = []
