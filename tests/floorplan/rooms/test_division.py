@@ -197,6 +197,23 @@ def test_wall_between_two_doorways_bounds_rooms_with_a_cupboard_at_it(
     assert rooms == len(plan.rooms)
 
 
+@pytest.mark.parametrize(
+    ("pier", "doorways"), [((4.3, 4.7), 2), ((3.6, 4.7), 1)], ids=["two doors", "door and gap"]
+)
+def test_pier_between_two_doors_of_a_room_leaves_both(
+    pier: tuple[float, float], doorways: int
+) -> None:
+    """It was left out as furniture in the search of passages, and the one across it was lost."""
+    corridor, room = shapely.box(1, 1, 9, 2.7), shapely.box(3, 2.9, 6, 7)
+    opening = shapely.box(3.3, 2.7, 5.7, 2.9) - shapely.box(pier[0], 2.7, pier[1], 2.9)
+
+    plan = FloorPlan.build(
+        "home", shapely.union_all([corridor, room, opening]), doorways=None, regions_are="none"
+    )
+
+    assert (2, doorways) == (len(plan.rooms), len(plan.doorways))
+
+
 def slanted_wall(*gaps: tuple[int, int]) -> FloorPlan:
     """Return a map of 8 x 5 m with a slanted wall, a pixel thick, that gaps [pixels] interrupt."""
     pixels = np.ones((100, 160), np.bool_)

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from shapely import LinearRing, MultiPolygon, Polygon
+from shapely import Geometry, LinearRing, MultiPolygon, Polygon
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import Segment, build_mesh
@@ -348,11 +348,13 @@ class Passages:
 
     Attributes:
         segments: Where they are [lattice], exactly from wall to wall.
-        is_opening: Whether each is an opening, which is wider than a doorway.
+        widths_m: How long each is [m].
+        is_opening: Whether each is wider than a doorway, or a gap that is narrower than one.
         between_straight_walls: Whether rooms can be found by them, as walls are straight.
     """
 
     segments: list[Segment]
+    widths_m: list[float]
     is_opening: list[bool]
     between_straight_walls: bool
 
@@ -369,17 +371,30 @@ def search_passages(
     walls = [_without_islands(polygon, lattice.units_per_m) for polygon in polygons]
     if len(walls) > 1:  # one may lie inside a former island of another
         walls = shapely.orient_polygons(shapely.get_parts(shapely.union_all(walls))).tolist()
+    islands = shapely.difference(MultiPolygon(walls), MultiPolygon(polygons))
     directions = WallDirections.of(walls, lattice.units_per_m) if kind == "none" else None
     straight = directions is not None and directions.straight
     walls = _with_few_corners(walls, lattice.units_per_m)
     mesh = build_mesh(walls, lattice.columns, lattice.rows)
     narrow = find_passages(mesh, walls, lattice.units_per_m, directions if straight else None)
-    lines = [_line(lattice, segment) for segment in narrow]
+    lines = [_line(lattice, piece) for piece in _between_islands(narrow, islands)]
     polygons, fitted, _ = fit_lines(lattice, polygons, lines)
     segments = [segment for segment in fitted if segment is not None]
-    limit2 = (MAX_DOOR_M * lattice.units_per_m) ** 2
-    is_opening = [(x1 - x0) ** 2 + (y1 - y0) ** 2 > limit2 for (x0, y0), (x1, y1) in segments]
-    return polygons, Passages(segments, is_opening, straight)
+    widths = [math.dist(*segment) / lattice.units_per_m for segment in segments]
+    is_opening = [not MIN_DOOR_M <= width <= MAX_DOOR_M for width in widths]
+    return polygons, Passages(segments, widths, is_opening, straight)
+
+
+def _between_islands(passages: Sequence[Segment], islands: Geometry) -> F64:
+    """Return the pieces of passages beside obstacles in them, such as a pier between two doors.
+
+    Returns:
+        The ends of each, float64 (n, 2, 2).
+    """
+    lines = shapely.linestrings(np.reshape(passages, (-1, 2, 2)))
+    pieces = shapely.get_parts(shapely.difference(lines, islands))
+    ends = [shapely.get_point(pieces, end) for end in (0, -1)]
+    return np.stack([shapely.get_coordinates(points) for points in ends], axis=1)
 
 
 def _without_islands(polygon: Polygon, units_per_m: float) -> Polygon:
@@ -454,8 +469,7 @@ def divide(
     chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
     if kind == "boxes":
         return label_rooms(lattice, free, regions, chambers, passages)
-    widths = [math.dist(*segment) / lattice.units_per_m for segment in passages.segments]
-    rooms = segment_rooms(chambers, passages.is_opening, widths, lattice.cell)
+    rooms = segment_rooms(chambers, passages.is_opening, passages.widths_m, lattice.cell)
     return number_rooms(lattice, divide_by_shape(rooms, lattice.cell, IN_STRAIGHT_WALLS))
 
 
@@ -496,7 +510,7 @@ def select_doorways(
     ], fitted_polygons if narrows else list(polygons)
 
 
-def _line(lattice: Lattice, segment: Segment) -> DoorLine:
+def _line(lattice: Lattice, segment: Segment | F64) -> DoorLine:
     (x0, y0), (x1, y1) = lattice.to_metres(segment).tolist()
     return DoorLine((x0, y0), (x1, y1), leaf=False)
 
