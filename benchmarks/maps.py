@@ -393,9 +393,14 @@ SAME_PLACE = {
 NECKS = (0.6, 0.65, 0.7, 0.75, 0.8)
 MOUTHS = (0.0, 0.25, 0.3, 0.35, 0.4)
 FURNITURE_M2 = (0.2, 0.3, 0.4, 0.5)
-"""Sizes up to which a free-standing obstacle narrows no space, chosen like the limits."""
-WALLS = {IN_STRAIGHT_WALLS: "straight walls", IN_RAGGED_WALLS: "ragged walls", OF_VACUUMS: "vacuum"}
-Choice = tuple[float, Limits]
+"""Sizes up to which a free-standing obstacle narrows no space, chosen like necks and mouths."""
+DIVIDED_BY = {
+    IN_STRAIGHT_WALLS: "passages, then shape",
+    IN_RAGGED_WALLS: "shape alone",
+    OF_VACUUMS: "shape alone",
+}
+"""Maps that are divided in one way share their necks and mouths."""
+Choice = tuple[float, float, float]
 Scored = dict[Choice, dict[str, float]]
 
 
@@ -406,7 +411,7 @@ def place_of(name: str) -> str:
 
 
 def scores_by_limits(captured: Captured) -> tuple[str, Scored]:
-    """Return what the walls of a map are like, and the scores of its rooms by what is chosen."""
+    """Return by what a map is divided, and the scores of its rooms by what is chosen."""
     divide = MagicMock(wraps=divide_by_shape)
     with patch.object(division, "divide_by_shape", divide):
         kind = "vacuum" if captured.kind == "vacuum" else "none"
@@ -419,8 +424,8 @@ def scores_by_limits(captured: Captured) -> tuple[str, Scored]:
         pixels = np.append(hill, -1)[captured.cells].astype(np.int64)
         common = overlap(pixels, captured.truth)
         for limits, scores in by_limits(hills, cell, own.least_m2, *common):
-            scored[furniture_m2, limits] = scores
-    return WALLS[own], scored
+            scored[furniture_m2, limits.neck, limits.mouth] = scores
+    return DIVIDED_BY[own], scored
 
 
 def by_limits(
@@ -440,27 +445,32 @@ def held_out_table() -> None:
     """Print the scores of maps at the limits that are best for the maps of all other places."""
     maps = [(item, *scores_by_limits(item)) for item in captured() if item.plan]
     tables: dict[str, dict[str, list[dict[str, Any]]]] = defaultdict(lambda: defaultdict(list))
-    for walls in WALLS.values():
-        same = [(item, scored) for item, own, scored in maps if own == walls]
+    for divided_by in dict.fromkeys(DIVIDED_BY.values()):
+        same = [(item, scored) for item, by, scored in maps if by == divided_by]
         fitted = best_choice(scored for _, scored in same)
-        print(f"{walls}: {len(same)} maps, fitted to all of them {fitted}")
+        print(f"{divided_by}: {len(same)} maps, fitted to all of them {fitted}")
         for item, scored in same:
             others = [s for other, s in same if place_of(other.name) != place_of(item.name)]
             chosen = best_choice(others)
             tables[item.kind]["held out"].append(scored[chosen])
             tables[item.kind]["fitted"].append(scored[fitted])
-            print(f"  {item.name:<32}{_scores([scored[chosen]])}  {chosen[0], *chosen[1]}")
+            print(f"  {item.name:<32}{_scores([scored[chosen]])}  {chosen}")
     for kind, table in tables.items():
         for name, rows in table.items():
             print(f"{kind + ', ' + name:<34}{_scores(rows)}")
 
 
 def best_choice(maps: Iterable[Scored]) -> Choice:
-    """Return the furniture and limits of the highest mean of IoU and recall."""
+    """Return the furniture, neck and mouth with the highest mean of `quality`."""
     scores = list(maps)
-    return max(
-        scores[0], key=lambda s: np.mean([(m[s]["iou"] + m[s]["recall"]) / 2 for m in scores])
-    )
+    return max(scores[0], key=lambda choice: np.mean([quality(m[choice]) for m in scores]))
+
+
+def quality(scores: dict[str, float]) -> float:
+    """Return the mean of IoU and F1, the harmonic mean of recall and precision."""
+    recall, precision = scores["recall"], scores["precision"]
+    f1 = 2 * recall * precision / (recall + precision) if recall else 0.0
+    return (scores["iou"] + f1) / 2
 
 
 # --- Captured maps that are changed --------------------------------------------------------------

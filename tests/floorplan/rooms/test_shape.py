@@ -129,6 +129,15 @@ def test_chair_narrows_nothing_but_a_cupboard_does(side: float, count: int) -> N
     assert count == len(areas(divide_by_shape(room, CELL, IN_RAGGED_WALLS)))
 
 
+@pytest.mark.parametrize(("length", "stays"), [(1.2, False), (1.4, True)])
+def test_free_standing_wall_is_no_furniture_however_thin_it_is(length: float, stays: bool) -> None:
+    """Vacuums draw walls as lines of one cell, of a smaller area than that of a table."""
+    rooms = np.zeros((20, 20), np.int32)
+    rooms[2 : 2 + round(length / CELL), 10] = -1
+
+    assert stays == (without_furniture(rooms, CELL) < 0).any()
+
+
 def test_obstacle_at_the_edge_of_the_map_is_no_furniture() -> None:
     rooms = np.zeros((5, 5), np.int32)
     rooms[0, 2] = rooms[2, 2] = -1

@@ -47,6 +47,7 @@ from fleet2d.floorplan.rooms.shape import (
     IN_RAGGED_WALLS,
     IN_STRAIGHT_WALLS,
     OF_VACUUMS,
+    WALL_M,
     divide_by_shape,
 )
 from fleet2d.kernels import (
@@ -333,7 +334,6 @@ a point each millimetre, it straightens the walls first …"""
 STRAIGHTENED_M = (0.01, 0.02, 0.04, 0.08, 0.16)
 """… within the first of these tolerances that leaves few enough corners, or within the last."""
 ISLAND_M = 3.0
-WALL_M = 1.2
 THICK_M = 0.25
 """A free-standing obstacle counts as a wall from a length of `ISLAND_M` on, or of `WALL_M` if it is
 at most `THICK_M` thick, or parts of it are over such a length, as of a wall with a cupboard at it;

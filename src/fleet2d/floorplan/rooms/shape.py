@@ -43,17 +43,20 @@ class Limits(NamedTuple):
 
 
 IN_STRAIGHT_WALLS = Limits(0.75, 0.3, 4.0)
-IN_RAGGED_WALLS = Limits(0.8, 0.25, 4.0)
-OF_VACUUMS = Limits(0.75, 0.4, 1.2)
+IN_RAGGED_WALLS = Limits(0.75, 0.35, 4.0)
+OF_VACUUMS = IN_RAGGED_WALLS._replace(least_m2=1.2)
 """Necks and mouths are those at which rooms agree best with what people see, by
-`benchmarks/maps.py held-out`. A vacuum knows of a small room only what is free in it."""
+`benchmarks/maps.py held-out`; between straight walls, passages have divided space before. A vacuum
+knows of a small room only what is free in it."""
 ARM_SHARE = 0.5
 ARM_M2 = 1.2
 """An arm of a space is at most this share as wide, and at least this large [m²]."""
 LONG = 3
 """A corridor is at least this many times as long as wide."""
 FURNITURE_M2 = 0.4
-"""Free-standing obstacles up to this size, such as chairs or a small table, narrow no space."""
+WALL_M = 1.2
+"""Free-standing obstacles up to this size and shorter than this, such as chairs or a small table,
+narrow no space. Longer ones may be walls, which a vacuum draws as thin lines."""
 SMOOTHED_M = 0.2
 """Heights are averaged twice over squares that reach this far to all sides."""
 FINE = 64
@@ -127,7 +130,10 @@ def without_furniture(room_of_cell: I32, cell: float) -> I32:
     """Return the room of each cell, of small free-standing obstacles too."""
     # A margin around the plan joins all that reaches its edge.
     part = label_parts(np.pad(room_of_cell, 1, constant_values=-1) < 0, True)
-    is_small = np.bincount(part[part >= 0]) * cell**2 <= FURNITURE_M2
+    frames = label_frames(part, int(part.max()) + 1)
+    spans = frames[:, 2:] - frames[:, :2] - 1  # between the centres of the outermost cells
+    is_small = (spans * spans).sum(axis=1) * cell**2 < WALL_M**2
+    is_small &= np.bincount(part[part >= 0]) * cell**2 <= FURNITURE_M2
     is_small[part[0, 0]] = False
     if not is_small.any():
         return room_of_cell
