@@ -11,6 +11,7 @@ from shapely import MultiPolygon, Polygon
 from tests.strategies import quick
 
 from fleet2d.floorplan.body_spaces import (
+    CUT_OFF_M2,
     RADII,
     THIN_RADIUS,
     BodySpace,
@@ -19,12 +20,13 @@ from fleet2d.floorplan.body_spaces import (
     large_parts,
     obstacles_among,
     solid_footprints,
+    stays_whole,
 )
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.home import lattice_footprint
 from fleet2d.floorplan.mesh import GRID
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.space import BODY_RADIUS, grow_boxes, grow_polygons
+from fleet2d.floorplan.space import BODY_RADIUS, grow_boxes, grow_polygons, shrink
 from fleet2d.kernels import I64
 
 box_of_floor = st.tuples(
@@ -132,3 +134,32 @@ def test_furniture_that_divides_a_room_cuts_it_at_every_radius() -> None:
         assert cuts_nothing(plan, [], beside, radius)
         assert not cuts_nothing(plan, [], boxes_of([across]), radius)
         assert cuts_nothing(plan, [across], boxes_of([across]), radius)
+
+
+@quick
+@given(st.lists(box_of_floor, max_size=6))
+def test_home_is_whole_only_if_no_body_has_a_second_large_space(
+    boxes: list[Box],
+) -> None:
+    plan = one_room("bedroom")
+    unit = plan.lattice.units_per_m
+    bed = stand_furniture("bed", (2.0, 2.0))
+    things = [replace(bed, footprint=footprint(*box)) for box in boxes]
+    solid = solid_footprints(plan, things)
+
+    if stays_whole(plan, solid, RADII):
+        for radius in RADII:
+            blocked = grow_polygons(solid, radius * unit)
+            spaces = shrink(plan.polygons, radius * unit, blocked)
+            assert 1 >= sum(space.area > CUT_OFF_M2 * unit**2 for space in spaces)
+
+
+def test_home_is_whole_unless_furniture_divides_it_or_a_wall_is_slanted() -> None:
+    plan = one_room("bedroom")
+    bed = replace(stand_furniture("bed", (2, 2)), footprint=shapely.box(2, 0, 2.5, 4))
+    across = lattice_footprint(plan, bed)
+    slanted = FloorPlan.build("tent", shapely.Polygon([(0, 0), (5, 0), (5, 4)]))
+
+    assert stays_whole(plan, [], RADII)
+    assert not stays_whole(plan, [across], RADII)
+    assert not stays_whole(slanted, [], RADII)

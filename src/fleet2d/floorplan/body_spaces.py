@@ -24,6 +24,12 @@ CUT_OFF_M2 = 0.25
 """Furniture may cut off less than this of a body's space, such as a corner behind a bed [m²]."""
 
 
+# By how much more than its radius a body's space is shrunk so that rounding can't make it smaller
+# [lattice], and the part of `CUT_OFF_M2` that is less than it in any case.
+ROUNDED = 8
+CERTAIN = 0.75
+
+
 class BodySpace:
     """The space of a body while a home is furnished room by room; it never changes.
 
@@ -135,6 +141,36 @@ def exact_space(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> lis
     """Return the space of a body among footprints, exactly as `Space` computes it [lattice]."""
     reach = radius * plan.lattice.units_per_m
     return shrink(plan.polygons, reach, grow_polygons(solid, reach))
+
+
+def stays_whole(plan: FloorPlan, solid: Sequence[Polygon], radii: Iterable[float]) -> bool:
+    """Return whether no body has a space besides its largest one that furniture may not cut off.
+
+    A fast check of homes whose walls and furniture are parallel to the axes: there a mitred buffer
+    whose corners are cut is the space of an octagonal body, but for rounding. It is taken a little
+    wider than that, so a passage counts only if it certainly is one.
+
+    Args:
+        plan: The home.
+        solid: The footprints of the objects that bodies can't pass [lattice].
+        radii: Those of the bodies [m].
+
+    Returns:
+        False also where this can't tell.
+    """
+    free = shapely.difference(MultiPolygon(plan.polygons), shapely.union_all(solid))
+    rings = shapely.get_rings(shapely.get_parts(free))
+    corners, ring_of = shapely.get_coordinates(rings, return_index=True)
+    is_slanted = (corners[1:] != corners[:-1]).all(axis=1)
+    if (is_slanted & (ring_of[1:] == ring_of[:-1])).any():
+        return False
+    unit = plan.lattice.units_per_m
+    for radius in radii:
+        space = free.buffer(-radius * unit - ROUNDED, join_style="mitre", mitre_limit=1.0)
+        areas = shapely.area(shapely.get_parts(space))
+        if not len(areas) or areas.sum() - areas.max() > CERTAIN * CUT_OFF_M2 * unit**2:
+            return False
+    return True
 
 
 def cuts_nothing(plan: FloorPlan, solid: Sequence[Polygon], boxes: I64, radius: float) -> bool:

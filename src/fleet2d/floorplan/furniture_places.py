@@ -19,6 +19,7 @@ from fleet2d.floorplan.body_spaces import (
     exact_space,
     large_parts,
     solid_footprints,
+    stays_whole,
 )
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.lattice import UNITS_PER_CELL
@@ -349,10 +350,12 @@ class Interior:
         def is_open(count: int) -> bool:
             added = list(chain.from_iterable(solid[:count]))
             boxes = shapely.bounds(added).astype(np.int64).reshape(-1, 4)
-            for radius in RADII:
-                if cuts_nothing(plan, fixed, boxes, radius):
-                    continue
-                large = large_parts(plan, exact_space(plan, [*fixed, *added], radius))
+            cut = [radius for radius in RADII if not cuts_nothing(plan, fixed, boxes, radius)]
+            standing = [*fixed, *added]
+            if not cut or stays_whole(plan, standing, cut):
+                return True
+            for radius in cut:
+                large = large_parts(plan, exact_space(plan, standing, radius))
                 if len(large) > 1:
                     inside = shapely.point_on_surface(large)
                     if any(shapely.contains(part, inside).sum() > 1 for part in before(radius)):
@@ -515,6 +518,7 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
     reach = count_cells(cell, DOOR_CLEARANCE)
     beside = count_cells(cell, 2 * BODY_RADIUS)
     cells = np.zeros_like(plan.free)
+    doorways = [_doorway_cells(plan, upright=upright) for upright in (False, True)]
     for turn in range(4):
         rooms = np.ascontiguousarray(np.rot90(plan.room_of_cell, turn))
         can_stand = np.ascontiguousarray(np.rot90(standing, turn))
@@ -523,7 +527,7 @@ def door_cells(plan: FloorPlan, standing: Bool) -> Bool:
         border[1:] = free[1:] & free[:-1] & (rooms[1:] != rooms[:-1])
         crossed = border.copy()
         crossed[1:] &= can_stand[1:] & can_stand[:-1]
-        seeds = np.array(np.rot90(_doorway_cells(plan, upright=turn % 2 == 1), turn))
+        seeds = np.array(np.rot90(doorways[turn % 2], turn))
         rows = np.flatnonzero(crossed.any(axis=1))
         across = crossed[rows]
         near = across | cells_after(across, beside, 1) | cells_after(across, -beside, 1)

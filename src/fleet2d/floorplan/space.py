@@ -5,13 +5,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, Polygon
+from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
@@ -659,17 +658,14 @@ def _upright_rectangle(footprint: Polygon) -> F64 | None:
 
     None for another shape.
     """
-    corners = shapely.get_coordinates(footprint).tolist()
-    if len(corners) != 5:
+    corners = shapely.get_coordinates(footprint)
+    if (corners[1:] == corners[:-1]).tolist() not in _UPRIGHT_SIDES:
         return None
-    xs, ys = zip(*corners, strict=True)
-    low, high = (min(xs), min(ys)), (max(xs), max(ys))
-    if not set(xs) <= {low[0], high[0]} or not set(ys) <= {low[1], high[1]}:
-        return None
-    # Each side leads along one axis.
-    if any((x == after_x) == (y == after_y) for (x, y), (after_x, after_y) in pairwise(corners)):
-        return None
-    return np.array([low, high])
+    return np.reshape(footprint.bounds, (2, 2))
+
+
+# Which coordinate each side of an upright rectangle leaves as it is.
+_UPRIGHT_SIDES = ([[True, False], [False, True]] * 2, [[False, True], [True, False]] * 2)
 
 
 def _cells_by_rectangle(lattice: Lattice, corners: I64, a: int, b: int) -> tuple[Window, Bool]:
@@ -685,8 +681,9 @@ def _cells_by_rectangle(lattice: Lattice, corners: I64, a: int, b: int) -> tuple
     rows, columns = _window(lattice, (x0 - a, y0 - a), (x1 + a, y1 + a))
     xs = _centres(columns)
     ys = _centres(rows)
-    x = np.maximum(np.maximum(x0 - xs, xs - x1), 0)
-    y = np.maximum(np.maximum(y0 - ys, ys - y1), 0)
+    # How far they are beyond its nearer side; less than 0 between the two.
+    x = np.maximum(x0 - xs, xs - x1)
+    y = np.maximum(y0 - ys, ys - y1)
     covered = (x <= a)[None, :] & (y <= a)[:, None] & (x[None, :] + y[:, None] <= a + b)
     return (rows, columns), covered
 
@@ -709,10 +706,8 @@ def with_approaches(
         return thing
     x0, y0, x1, y1 = thing.footprint.bounds
     near = shapely.box(x0 - SIT_REACH, y0 - SIT_REACH, x1 + SIT_REACH, y1 + SIT_REACH)
-    solid = np.array(
-        [other.footprint for other in others if other.blocks != "nothing" and other is not thing],
-        np.object_,
-    )
+    blocking = [o.footprint for o in others if o.blocks != "nothing" and o is not thing]
+    solid = np.array(blocking, np.object_)
     solid = solid[shapely.intersects(near, solid)]
     uses = []
     for use in thing.uses:
@@ -757,7 +752,8 @@ def nearest_standing(
     for wanted in (FIRST_ATTEMPTS, ATTEMPTS):
         cells = nearest_cells_in_sight(plan.mesh, standing, x, y, units, ATTEMPTS, wanted)
         for row, column in cells[tried:].tolist():
-            step = LineString([(use.x, use.y), lattice.xy_of(*lattice.cell_centre(row, column))])
+            ends = [(use.x, use.y), lattice.xy_of(*lattice.cell_centre(row, column))]
+            step = shapely.linestrings(ends)  # quicker than the constructor
             if not shapely.intersects(step, obstacles).any():
                 return row, column
         tried = wanted
