@@ -238,7 +238,7 @@ def _outline(shape: Any, unit: float) -> shapely.Polygon:
 
 def _corners(shape: Any, tolerance: float) -> float:
     """Return how many corners a shape has."""
-    rings = shapely.get_rings(shapely.simplify(shape, tolerance))
+    rings = shapely.get_rings(shapely.get_parts(shapely.simplify(shape, tolerance)))
     return float(sum(len(ring.coords) - 1 for ring in rings))
 
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import shapely
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 NAMES = sorted(path.name for path in BENCHMARKS.glob("*.py"))
@@ -33,3 +34,11 @@ def test_studies_are_measured() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert 0 == done.returncode, done.stderr
     assert "overhead per variant" in done.stdout
+
+
+def test_corners_of_all_parts_of_a_home_are_counted() -> None:
+    measure = runpy.run_path(str(BENCHMARKS / "synthetic_homes.py"), run_name="imported")
+    storeys = shapely.MultiPolygon([shapely.box(0, 0, 9, 9), shapely.box(20, 0, 29, 9)])
+
+    assert 8 == measure["_corners"](storeys, 1)
+    assert 4 == measure["_corners"](storeys.geoms[0], 1)
