@@ -219,8 +219,10 @@ def calibrate_perception(
     Raises:
         InputError: The log can't be read or fitted, a file can't be written, or scipy is missing.
     """
-    from fleet2d.errors import InputError, os_errors_as
-    from fleet2d.learning.fit.perception import calibrate, read_detections
+    from fleet2d.errors import InputError, extra, os_errors_as
+
+    with extra("calibrate", "fitting a camera needs scipy"):
+        from fleet2d.learning.fit.perception import calibrate, read_detections
 
     if picture is not None:
         from fleet2d.viewing.pictures.floorplan import check_picture
