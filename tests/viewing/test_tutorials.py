@@ -77,8 +77,8 @@ def test_tutorial_is_that_of_the_documentation_with_its_pictures(here: Path, fle
     code, out, _ = fleet2d("demo", "--tutorial", "study")
 
     assert 0 == code
-    assert out.startswith("study.ipynb: open it")
-    written, own = cells(here / "study.ipynb"), cells(tutorials.sources()["study"])
+    assert out.startswith("study/study.ipynb: open it")
+    written, own = cells(here / "study" / "study.ipynb"), cells(tutorials.sources()["study"])
     of_code = [cell for cell in own if cell["cell_type"] == "code"]
     assert of_code == [cell for cell in written if cell["cell_type"] == "code"]
     assert "image/png" in json.dumps(of_code)
@@ -87,7 +87,7 @@ def test_tutorial_is_that_of_the_documentation_with_its_pictures(here: Path, fle
 def test_guide_has_no_links_to_pages_that_are_not_there(here: Path, fleet2d: Cli) -> None:
     assert 0 == fleet2d("demo", "--tutorial", "layers")[0]
 
-    text = (here / "layers.ipynb").read_text(encoding="utf-8")
+    text = (here / "layers" / "layers.ipynb").read_text(encoding="utf-8")
     assert ".md)" not in text
     assert "images/" not in text
     assert "How long ago each place was seen" in text  # of a picture
@@ -103,11 +103,12 @@ def test_links_to_other_sites_stay(tmp_path: Path) -> None:
 
 
 def test_notebook_that_somebody_works_in_is_kept(here: Path, fleet2d: Cli) -> None:
-    (here / "study.ipynb").write_text("mine", encoding="utf-8")
+    (here / "study").mkdir()
+    (here / "study" / "study.ipynb").write_text("mine", encoding="utf-8")
 
     assert 0 == fleet2d("demo", "--tutorial", "study")[0]
 
-    assert "mine" == (here / "study.ipynb").read_text(encoding="utf-8")
+    assert "mine" == (here / "study" / "study.ipynb").read_text(encoding="utf-8")
 
 
 def test_unknown_tutorial_is_told_with_the_nearest_name(here: Path, fleet2d: Cli) -> None:
@@ -137,7 +138,7 @@ def test_where_jupyter_refuses_as_to_root_it_is_told_where_the_notebook_is(
     code, out, _ = fleet2d("demo", "--tutorial", "study")
 
     assert 0 == code
-    assert out.startswith("study.ipynb: open it")
+    assert out.startswith("study/study.ipynb: open it")
 
 
 @pytest.mark.parametrize(("options", "opened"), [((), True), (("--no-view",), False)])
@@ -155,7 +156,7 @@ def test_jupyter_opens_it_where_it_is_installed(
     code, out, _ = fleet2d("demo", "--tutorial", "study", *options)
 
     assert 0 == code
-    assert opened == (calls == [[sys.executable, "-m", "notebook", "study.ipynb"]])
+    assert opened == (calls == [[sys.executable, "-m", "notebook", "study/study.ipynb"]])
     assert opened == (out == "")
 
 
@@ -170,7 +171,7 @@ def test_folder_that_cannot_be_written_is_told(
     code, _, err = fleet2d("demo", "--tutorial", "study")
 
     assert 2 == code
-    assert "study.ipynb can't be written: No space left on device" in err
+    assert "study/study.ipynb can't be written: No space left on device" in err
 
 
 def test_installed_without_a_clone_the_package_has_them(

@@ -41,7 +41,7 @@ def demo(
     view: Annotated[bool, typer.Option(help="Whether to open the page, or Jupyter.")] = True,
     tutorial: Annotated[
         str | None,
-        typer.Option(help="Write this tutorial or guide into the present folder, as a notebook."),
+        typer.Option(help="Write this tutorial or guide as a notebook, into a folder of its name."),
     ] = None,
     lists: Annotated[bool, typer.Option("--list", help="List all tutorials and guides.")] = False,
 ) -> None:
@@ -85,7 +85,7 @@ def _teach(tutorial: str | None, *, opens: bool) -> None:
         for name, source in sources().items():
             typer.echo(f"{name:18} {title(source)}")
         return
-    path = write_notebook(tutorial, Path())
+    path = write_notebook(tutorial)
     if not (opens and open_in_jupyter(path)):
         typer.echo(f"{path}: open it in your editor, or in Jupyter (pip install notebook)")
 

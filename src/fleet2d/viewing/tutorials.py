@@ -31,17 +31,20 @@ def sources() -> dict[str, Path]:
     return {path.stem: path for path in (*sorted((folder / "tutorials").glob("*.ipynb")), *guides)}
 
 
-def write_notebook(name: str, folder: Path) -> Path:
-    """Write a tutorial or a guide into a folder as a notebook; a file of its name is kept.
+def write_notebook(name: str) -> Path:
+    """Write a tutorial or a guide as a notebook, unless it is there already.
+
+    It gets a folder, as its cells write files: two notebooks may have files of the same name.
 
     Raises:
         InputError: There is no such tutorial or guide, or the file can't be written.
     """
     known = sources()
     check_known(name, "tutorial", known, InputError)
-    path = folder / f"{name}.ipynb"
+    path = Path(name, f"{name}.ipynb")
     if not path.exists():
         with os_errors_as(InputError, f"{path} can't be written"):
+            path.parent.mkdir(exist_ok=True)
             write_atomically(path, json.dumps(notebook(known[name]), indent=1).encode())
     return path
 
