@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,12 @@ def leaves(entry: Any) -> Iterator[str]:
         return
     for inner in entry.values() if isinstance(entry, dict) else entry:
         yield from leaves(inner)
+
+
+@cache
+def written() -> dict[str, str | bytes]:
+    """The pages that people wrote, and the files beside them."""
+    return site.written_pages()
 
 
 def words(text: str) -> int:
@@ -75,13 +82,13 @@ def test_navigation_names_no_page_twice() -> None:
 
 @pytest.mark.slow
 def test_navigation_names_each_page_that_is_written_or_made() -> None:
-    pages = {**site.written_pages(), **site.generated_pages()}
+    pages = {**written(), **site.generated_pages()}
     assert all(pages.values())
     assert set(nav()) == {uri for uri in pages if uri.endswith(".md")}
 
 
 def test_site_has_a_notebook_of_each_tutorial_and_of_each_guide_with_python() -> None:
-    pages = site.written_pages()
+    pages = written()
     notebooks = {Path(uri).stem: uri for uri in pages if uri.endswith(".ipynb")}
     assert set(sources()) == set(notebooks)
     assert 11 < len(notebooks)
@@ -127,7 +134,7 @@ def test_page_of_the_gallery_is_that_of_its_pieces() -> None:
 
 def test_first_page_and_gallery_lead_to_each_day_of_the_gallery_live() -> None:
     days = [f"live/{piece.name}.html" for piece in gallery.PIECES if piece.at is not None]
-    pages = {uri: str(text) for uri, text in site.written_pages().items()}
+    pages = {uri: str(text) for uri, text in written().items()}
     assert ["month.html", *days] == re.findall(r'<option value="([^"]*)"', pages["index.md"])
     assert days == re.findall(r"\]\((live/.*?)\)", pages["gallery.md"])
 
