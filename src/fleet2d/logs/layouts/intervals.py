@@ -1,6 +1,5 @@
 """What layouts with sensors and activities share: labelling one by the other."""
 
-from bisect import bisect_right
 from collections.abc import Sequence
 
 from fleet2d.logs.log import AWAY, Reading
@@ -22,12 +21,24 @@ def is_leaving(activity: str) -> bool:
 
 
 def label_by_activities(sensors: Sequence[Reading], activities: Sequence[Reading]) -> list[Reading]:
-    """Label readings of sensors by the concurrent activity, and add readings for absences."""
-    begins = [activity.begin_us for activity in activities]
+    """Label readings of sensors by the concurrent activity, and add readings for absences.
+
+    Of several it is the one that began last: whoever gets up at night sleeps on afterwards.
+
+    Args:
+        sensors: The readings, in any order.
+        activities: The activities, in order of their beginnings.
+    """
     readings = [reading for reading in activities if reading.room == AWAY]
-    for sensor in sensors:
-        number = bisect_right(begins, sensor.begin_us) - 1
-        is_part = number >= 0 and sensor.begin_us <= activities[number].end_us
-        readings.append(sensor._replace(activity=activities[number].activity if is_part else ""))
+    begun: list[Reading] = []
+    coming = iter(activities)
+    following = next(coming, None)
+    for sensor in sorted(sensors, key=lambda reading: reading.begin_us):
+        while following is not None and following.begin_us <= sensor.begin_us:
+            begun.append(following)
+            following = next(coming, None)
+        while begun and begun[-1].end_us < sensor.begin_us:
+            begun.pop()
+        readings.append(sensor._replace(activity=begun[-1].activity if begun else ""))
     # Of readings with the same begin, being out comes last, so that it holds.
     return sorted(readings, key=lambda reading: (reading.begin_us, reading.room == AWAY))
