@@ -39,7 +39,6 @@ def test_the_scenario_of_these_tests_has_every_kind_of_row(whole: Run) -> None:
         "gives_way",
         "gives_up",
         "deadlock",
-        "overlaps",
     } == set(events["event"])
     reactions = set(zip(events["entity"], [d.split(" ")[0] for d in events["detail"]], strict=True))
     assert {

@@ -94,19 +94,6 @@ def test_two_robots_that_go_to_one_spot_stop_beside_each_other(people_block: str
     assert np.hypot(*(np.array(ends_at(stored, "guard")) - 3)) < 0.6
 
 
-def test_a_robot_that_drives_goes_round_those_that_stand_in_a_row() -> None:
-    """The one in the middle stepped aside, though there was room at the ends."""
-    robots = {"butler": robot([1, 3], [4, 3], 60.0)}
-    robots |= {f"r{i}": robot([2.5, 2.6 + 0.4 * i]) for i in range(3)}
-    stored = run(scenario("1 min", robots=robots))
-    assert ends_at(stored, "butler") == (4.0, 3.0)
-    assert all(nearest(stored, *pair) >= 0 for pair in combinations(robots, 2))
-    for name in ("r0", "r1", "r2"):
-        way = path(stored, name)
-        assert {way.x[0]} == set(way.x)
-        assert {way.y[0]} == set(way.y)
-
-
 def test_ghosts_pass_through_each_other() -> None:
     robots = {"butler": robot([1, 3], [4, 3], 60.0), "guard": robot([2.5, 3])}
     stored = run(scenario("1 min", robots=robots, simulation={"ghosts": True}))

@@ -477,7 +477,7 @@ class Yielding(Watcher):
         if other not in self._number or not self._rests(row, now.step):
             return None
         theirs = Situation(self._actors[other], now.step, (), now.outputs)
-        plan = self._by_waiting(theirs, at, row)
+        plan = self._by_via(theirs, at, row)
         return None if plan is None else (theirs, self._noted(theirs, row, plan))
 
     def _beside(self, actor: DecidingActor, other: int) -> I64:
