@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
+from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_rays, drop_scraps
 from fleet2d.kernels import label_parts
 
 
@@ -121,3 +121,52 @@ def test_room_behind_a_wide_shut_door_gets_a_door_in_its_middle() -> None:
     rows = np.flatnonzero(opened.any(axis=1))
     assert 0.7 <= (rows[-1] - rows[0] + 1) * raw.pixel <= 0.9
     assert abs(rows.mean() - 65) < 1.5
+
+
+def seen_through_a_window(walls: str = "#") -> OccupancyMap:
+    """A room of 2 m x 4 m with a window of two pixels, and the rays that widen beyond it."""
+    pixels = np.full((60, 62), " ")
+    pixels[8:52, 0:24] = walls
+    pixels[10:50, 2:22] = "."
+    pixels[29:31, 22:24] = "."
+    for column in range(24, 60):
+        half = 1 + (column - 24) // 3
+        pixels[30 - half : 30 + half, column] = "."
+    pixels[30 - 12 : 30 + 12, 60] = "#"  # the neighbor's wall, where the rays end
+    return OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+
+def test_what_was_seen_through_a_window_is_left_out_and_the_room_stays() -> None:
+    """In two homes of shared data bundles of rays were rooms, in which people could not be."""
+    raw = seen_through_a_window()
+    nobody = np.zeros(raw.free.shape, np.bool_)
+
+    rays, note = drop_rays(raw, 0.3, nobody)
+
+    assert not rays[10:50, 2:22].any()
+    assert rays[:, 26:60].sum() == raw.free[:, 26:60].sum()
+    assert "rays left out" in note
+    assert not drop_rays(raw, 0.0, nobody)[0].any()
+
+
+def test_a_place_that_a_robot_reached_is_no_ray() -> None:
+    raw = seen_through_a_window()
+    driven = np.zeros(raw.free.shape, np.bool_)
+    driven[30, 50] = True
+
+    assert not drop_rays(raw, 0.3, driven)[0].any()
+
+
+def test_without_walls_nothing_is_taken_for_rays() -> None:
+    raw = seen_through_a_window(walls=" ")
+
+    assert not drop_rays(raw, 0.3, np.zeros(raw.free.shape, np.bool_))[0].any()
+
+
+def test_a_second_room_that_its_walls_enclose_is_no_ray() -> None:
+    pixels = np.full((24, 44), "#")
+    pixels[2:22, 2:20] = pixels[2:22, 24:42] = "."
+    pixels[11, 20:24] = "."
+    raw = OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+    assert not drop_rays(raw, 0.3, np.zeros(raw.free.shape, np.bool_))[0].any()

@@ -245,6 +245,48 @@ def drop_scraps(raw: OccupancyMap, scrap_area_m2: float) -> tuple[Bool, str]:
     )
 
 
+def drop_rays(raw: OccupancyMap, ray_width: float, visited: Bool) -> tuple[Bool, str]:
+    """Return the pixels of what was only seen from the home, as through a window, and a note.
+
+    A room ends at walls, and a ray where nothing is known. So these are parts of at least a scrap's
+    area, joined to others by passages narrower than `ray_width` at most, where nobody was, and
+    whose border is wall for less than half. In a map without walls there are none.
+
+    Args:
+        raw: The map.
+        ray_width: Diameter of the disc that parts are wide enough for [m]; 0 drops none.
+        visited: Pixels of rooms, or where a robot drove, bool (rows, columns).
+    """
+    part, areas = _parts(raw, ray_width)
+    border = np.zeros(len(areas) + 1)  # its last entry, as of what follows, serves -1
+    walled = np.zeros(len(areas) + 1)
+    beside_wall = _spread(raw.occupied)
+    for number in range(len(areas)):
+        own = part == number
+        around = _spread(own) & ~own
+        border[number] = np.count_nonzero(around)
+        walled[number] = np.count_nonzero(around & beside_wall)
+    rays = (2 * walled < border) & np.append(areas >= SCRAP_M2, False)
+    rays[part[visited & (part >= 0)]] = False
+    largest = int(np.argmax(areas)) if len(areas) else -1
+    if ray_width == 0 or not rays.any() or rays[largest]:
+        return np.zeros(raw.free.shape, np.bool_), ""
+    dropped: Bool = rays[part]
+    x, y = raw.to_metres(np.argwhere(dropped)[:, ::-1].mean(axis=0) + 0.5).tolist()
+    area = float(np.count_nonzero(dropped)) * raw.pixel**2
+    return dropped, (
+        f"rays left out: {area:.2f} m2 round ({x:.2f}, {y:.2f}) m, most of whose border isn't wall,"
+        " and where no room or path is; ray_width: 0 keeps them"
+    )
+
+
+def _spread(mask: Bool) -> Bool:
+    """Return a mask with all pixels beside it."""
+    wide = np.pad(mask, 1)
+    sides = (wide[:-2, 1:-1], wide[2:, 1:-1], wide[1:-1, :-2], wide[1:-1, 2:])
+    return np.logical_or.reduce([mask, *sides])
+
+
 def remove_specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Bool, list[str]]:
     """Return the pixels of small groups that are surrounded by free ones, and a note.
 

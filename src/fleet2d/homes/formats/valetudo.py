@@ -20,7 +20,7 @@ from pydantic import Field, TypeAdapter
 from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.configuration.units import InputPath
+from fleet2d.configuration.units import InputPath, Length
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import (
@@ -36,7 +36,7 @@ from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_names
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
-from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_scraps
+from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_rays, drop_scraps
 from fleet2d.homes.formats.occupancy import outline
 from fleet2d.homes.formats.pixels import PixelSource
 from fleet2d.homes.formats.rand256 import (
@@ -291,6 +291,9 @@ class Valetudo(PixelSource, FileSource):
             (`keep_out`), walls (`wall`), or nothing (`ignore`).
         bridge_pixels: Width of the widest gap between two parts of the home that opens, as at a
             threshold or where the vacuum drove; 0 opens none.
+        ray_width: Floor that at most passages narrower than this join is left out if its border is
+            mostly no wall, and neither a segment nor the path is there: it was seen through a
+            window [m]; 0 keeps it.
         scrap_area_m2: Floor smaller than this is no room: alone it is left out, beside a segment it
             belongs to that; 0 keeps it.
         borders: Doorways: also where segments meet at a narrow place (`segments`), or only between
@@ -307,6 +310,7 @@ class Valetudo(PixelSource, FileSource):
     path: InputPath
     no_go: NoGo = "keep_out"
     bridge_pixels: int = Field(default=2, ge=0, le=10)
+    ray_width: Length = Field(default=0.3, ge=0)
     scrap_area_m2: float = Field(default=1.0, ge=0)
     borders: Literal["segments", "exact"] = "segments"
 
@@ -339,7 +343,9 @@ class Valetudo(PixelSource, FileSource):
             note_size(content, box, notes)
             free, wall = _free_pixels(layers, box, notes)
             if free.any():
-                free = self._clean(content, free, wall, box, notes)
+                corner = (box.column * pixel_m, box.row * pixel_m)
+                raw = OccupancyMap(free, wall, pixel_m, corner)
+                free = self._clean(raw, _driven(content, box), _in_segments(layers, box), notes)
             areas = _no_go_areas(content, free, box, self.no_go, notes)
             if not free.any():
                 raise FloorPlanError("no floor is left: all of it is wall or in no-go areas")
@@ -359,16 +365,14 @@ class Valetudo(PixelSource, FileSource):
                 notes=tuple(notes),
             )
 
-    def _clean(
-        self, content: dict[str, Any], free: Bool, wall: Bool, box: PixelBox, notes: list[str]
-    ) -> Bool:
-        """Return the free pixels with gaps open and without scraps."""
-        pixel_m = pixel_side(content)
-        raw = OccupancyMap(free, wall, pixel_m, (box.column * pixel_m, box.row * pixel_m))
-        gaps, gap_note = bridge_gaps(raw, self.bridge_pixels, _driven(content, box))
-        raw = replace(raw, free=free | gaps)
+    def _clean(self, raw: OccupancyMap, driven: Bool, rooms: Bool, notes: list[str]) -> Bool:
+        """Return the free pixels with gaps open, and without rays and scraps."""
+        gaps, gap_note = bridge_gaps(raw, self.bridge_pixels, driven)
+        raw = replace(raw, free=raw.free | gaps)
+        rays, ray_note = drop_rays(raw, self.ray_width, driven | rooms)
+        raw = replace(raw, free=raw.free & ~rays)
         scraps, scrap_note = drop_scraps(raw, self.scrap_area_m2)
-        notes += [note for note in (gap_note, scrap_note) if note]
+        notes += [note for note in (gap_note, ray_note, scrap_note) if note]
         return raw.free & ~scraps
 
 
@@ -433,6 +437,16 @@ def _free_pixels(layers: list[PixelLayer], box: PixelBox, notes: list[str]) -> t
         if both.any():
             notes.append(f"{np.count_nonzero(both)} pixels are {reason}")
     return floor & ~wall, wall
+
+
+def _in_segments(layers: list[PixelLayer], box: PixelBox) -> Bool:
+    """Return the pixels of all segments, bool (rows, columns)."""
+    inside = np.zeros((box.rows, box.columns), np.bool_)
+    for layer in layers:
+        if layer.kind == "segment":
+            part = PixelBox.around(layer.runs)
+            inside[box.window(part)] |= part.paint(layer.runs)
+    return inside
 
 
 def _driven(content: dict[str, Any], box: PixelBox) -> Bool:
