@@ -145,7 +145,6 @@ def stored(folder: Path) -> Path:
     ("command", "made"),
     [
         (("show", "run"), "run/picture.png"),
-        (("export", "run", "report.html", "--format", "report"), "report.html"),
         (("export", "run", "page.html"), "page.html"),
         (("export", "run", "a.gif", "--height", "120", "--to", "step 60"), "a.gif"),
     ],

@@ -27,8 +27,8 @@ from fleet2d.floorplan.space import (
     PointDistances,
     Space,
     _grow_walls,
-    _octagon,
     _with_walls_moved,
+    body_octagon,
     grow_polygons,
     grow_shape,
 )
@@ -456,9 +456,9 @@ def moved_and_grown(
     """Yield what is left of each polygon by moving its walls, and by growing them."""
     for polygon in polygons:
         rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(polygon)]
-        walls = np.concatenate([_grow_walls(ring, _octagon(radius)) for ring in rings])
+        walls = np.concatenate([_grow_walls(ring, body_octagon(radius)) for ring in rings])
         rest = shapely.difference(polygon, shapely.union_all(walls))
-        yield _with_walls_moved(polygon, _octagon(radius)), rest
+        yield _with_walls_moved(polygon, body_octagon(radius)), rest
 
 
 @quick

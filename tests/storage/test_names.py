@@ -76,7 +76,7 @@ def test_run_of_names_in_any_script_is_stored_reproduced_and_exported(
 
     assert 0 == fleet2d("run", str(file), "--out", str(run), "--quiet")[0]
     assert 0 == fleet2d("verify", str(run), "--again")[0]
-    for name in ("posen ü.csv", "a.jsonl", "a.geojson", "a.mcap", "seite ä.html"):
+    for name in ("posen ü.csv", "a.jsonl", "a.mcap", "seite ä.html"):
         code, out, err = fleet2d("export", str(run), str(folder / name), "--to", "10 min")
         assert 0 == code, (name, out, err)
         content = (folder / name).read_bytes()
