@@ -100,6 +100,17 @@ def synthetic_times() -> list[float]:
     return [_best(lambda seed=seed: Synthetic(seed=seed).load()) for seed in range(HOMES)]
 
 
+def furnished_times() -> list[float]:
+    """Return how long furnished synthetic homes take that were never made before [ms]."""
+    Synthetic(seed=HOMES, furnish=True).plan()
+    times = []
+    for seed in range(HOMES):
+        start = time.process_time()
+        Synthetic(seed=seed, furnish=True).plan()
+        times.append(1e3 * (time.process_time() - start))
+    return times
+
+
 def region_times(data: Path) -> Iterable[tuple[Path, int, float]]:
     """Yield each jagged map, its number of free cells, and how long all their views take [ms]."""
     for path in _maps(data):
