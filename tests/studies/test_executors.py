@@ -16,6 +16,7 @@ from tests.studies.scenes import CountingExecutor
 
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runtime.memory import OBJECTS
+from fleet2d.studies import executors
 from fleet2d.studies.executors import (
     MAX_BATCH,
     Crew,
@@ -203,6 +204,16 @@ def test_a_job_that_no_worker_can_load_is_an_error_with_its_traceback() -> None:
 def test_a_worker_with_much_memory_is_replaced_between_two_calls() -> None:
     ends = ends_of(Crew(LocalExecutor(1, memory_mb=1.0), batch_s=0.0), pid_of, "abc")
     assert 3 == len({end.payload for end in ends})
+
+
+@pytest.mark.slow
+def test_memory_is_shared_among_processes_that_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With 99 workers for eight runs each process was replaced after each call."""
+    monkeypatch.setattr(executors, "_memory_mb", lambda: 2_000.0)
+
+    ends = ends_of(Crew(LocalExecutor(99), workers=1, batch_s=0.0), pid_of, "abc")
+
+    assert 1 == len({end.payload for end in ends})
 
 
 def pid_of(task: WorkerTask) -> int:

@@ -277,13 +277,13 @@ class LocalExecutor(ThreadPoolExecutor):
     Args:
         workers: The number of processes.
         memory_mb: Memory beyond which a process is replaced between two calls [MB]; None: an equal
-            share of 80 % of the machine's memory.
+            share of 80 % of the machine's memory among the processes that there are.
     """
 
     def __init__(self, workers: int, memory_mb: float | None = None) -> None:
         """Create the executor; processes start with the first calls."""
         super().__init__(workers, "fleet2d-worker")
-        self._memory_mb = memory_mb or MEMORY_SHARE * _memory_mb() / workers
+        self._memory_mb = memory_mb
         self._lock = threading.Lock()
         self._is_open = True
         self._processes: list[_WorkerProcess] = []
@@ -311,7 +311,8 @@ class LocalExecutor(ThreadPoolExecutor):
         except (EOFError, OSError):
             self._end(process)
             raise RuntimeError(f"the worker process ended ({process.cause})") from None
-        if memory_mb > self._memory_mb:
+        most_mb = self._memory_mb or MEMORY_SHARE * _memory_mb() / len(self._processes)
+        if memory_mb > most_mb:
             self._end(process)
         else:
             self._idle.append(process)
