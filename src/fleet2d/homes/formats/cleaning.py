@@ -258,33 +258,26 @@ def drop_rays(raw: OccupancyMap, ray_width: float, visited: Bool) -> tuple[Bool,
         visited: Pixels of rooms, or where a robot drove, bool (rows, columns).
     """
     part, areas = _parts(raw, ray_width)
-    border = np.zeros(len(areas) + 1)  # its last entry, as of what follows, serves -1
-    walled = np.zeros(len(areas) + 1)
-    beside_wall = _spread(raw.occupied)
-    for number in range(len(areas)):
-        own = part == number
-        around = _spread(own) & ~own
-        border[number] = np.count_nonzero(around)
-        walled[number] = np.count_nonzero(around & beside_wall)
-    rays = (2 * walled < border) & np.append(areas >= SCRAP_M2, False)
+    own = np.pad(part, 1, constant_values=-1)
+    beside_wall = np.pad(squared_distance(~raw.occupied) <= 1, 1)
+    border, walled = np.zeros((2, len(areas)), np.int64)
+    for axis in (0, 1):
+        for shift in (1, -1):
+            ends = (own >= 0) & (np.roll(own, shift, axis) != own)
+            border += np.bincount(own[ends], minlength=len(areas))
+            ends &= np.roll(beside_wall, shift, axis)
+            walled += np.bincount(own[ends], minlength=len(areas))
+    rays = (2 * walled < border) & (areas >= SCRAP_M2)
     rays[part[visited & (part >= 0)]] = False
-    largest = int(np.argmax(areas)) if len(areas) else -1
-    if ray_width == 0 or not rays.any() or rays[largest]:
+    if ray_width == 0 or not rays.any() or rays[np.argmax(areas)]:
         return np.zeros(raw.free.shape, np.bool_), ""
-    dropped: Bool = rays[part]
+    dropped: Bool = np.append(rays, False)[part]  # -1, of no part, is the last
     x, y = raw.to_metres(np.argwhere(dropped)[:, ::-1].mean(axis=0) + 0.5).tolist()
     area = float(np.count_nonzero(dropped)) * raw.pixel**2
     return dropped, (
         f"rays left out: {area:.2f} m2 round ({x:.2f}, {y:.2f}) m, most of whose border isn't wall,"
         " and where no room or path is; ray_width: 0 keeps them"
     )
-
-
-def _spread(mask: Bool) -> Bool:
-    """Return a mask with all pixels beside it."""
-    wide = np.pad(mask, 1)
-    sides = (wide[:-2, 1:-1], wide[2:, 1:-1], wide[1:-1, :-2], wide[1:-1, 2:])
-    return np.logical_or.reduce([mask, *sides])
 
 
 def remove_specks(raw: OccupancyMap, speck_area_m2: float) -> tuple[Bool, list[str]]:

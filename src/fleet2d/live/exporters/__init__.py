@@ -201,7 +201,7 @@ _FORMATS = {
     ),
     "rosbag2": (
         "bags",
-        "ROS 2 messages as a bag in SQLite, which any ROS 2 can play: needs the extra `ros`.",
+        "ROS 2 messages as a bag in MCAP, which `ros2 bag play` plays: needs the extra `ros`.",
     ),
 }
 """The module of each format, and what it is."""
