@@ -183,3 +183,16 @@ def test_installed_without_a_clone_the_package_has_them(
     monkeypatch.setattr(tutorials, "PACKAGE", package)
 
     assert ["first"] == list(tutorials.sources())
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("algorithm", "--out is the folder"), ("", "no tutorial")]
+)
+def test_what_a_tutorial_can_not_heed_is_told(
+    name: str, told: str, here: Path, fleet2d: Cli
+) -> None:
+    options = ["--out", "lessons"] if name else []
+    code, _, err = fleet2d("demo", "--tutorial", name, *options)
+
+    assert (2, True) == (code, told in err)
+    assert not list(here.iterdir())

@@ -55,8 +55,10 @@ def demo(
       fleet2d demo --no-view --out month
       fleet2d demo --tutorial algorithm
     """
-    if lists or tutorial:
-        _teach(tutorial, opens=view)
+    if lists or tutorial is not None:
+        if out is not None:
+            raise InputError("--out is the folder of a run: a tutorial gets a folder of its name")
+        _teach(None if lists else tutorial, opens=view)
         return
     directory = out or Path(tempfile.mkdtemp(prefix="fleet2d-"))
     run = run_with_progress(set_up(None, None, directory, strict=False, quiet=True))

@@ -327,8 +327,8 @@ class Valetudo(PixelSource, FileSource):
         """Read the map.
 
         Free space is the pixels of floors and segments without those of walls, gaps at thresholds
-        included and scraps left out. Every segment is a room under the name that it has in the
-        vacuum's app.
+        included, rays and scraps left out. Every segment is a room under the name that it has in
+        the vacuum's app.
 
         Raises:
             FloorPlanError: The file can't be read, isn't such a map, or has no floor.
