@@ -9,6 +9,7 @@ import pytest
 from tests.two_storeys import PLAN
 
 import fleet2d
+from fleet2d.kernels import Poses, sum_moves
 from fleet2d.live.twists import twists
 
 
@@ -48,3 +49,24 @@ def test_stairs_have_no_length(tmp_path: Path) -> None:
 
 def test_a_walk_across_the_middle_between_the_ends_keeps_its_length(tmp_path: Path) -> None:
     assert speeds(tmp_path, [(4.0, 1, 0), (5.0, 1, 0)]) == [[0.5, 0.0, 0.0]]
+
+
+def test_a_move_is_as_long_as_metrics_have_it(tmp_path: Path) -> None:
+    path = tmp_path / "house.json"
+    path.write_text(json.dumps(PLAN))
+    plan = fleet2d.load_floorplan(path)
+    draws = np.random.default_rng(4)
+    ends = np.array([(0.5, 3.5), (10.5, 3.5)])
+    before, after = (
+        ends[draws.integers(2, size=200)] + draws.normal(0, 1.5, (200, 2)) for _ in range(2)
+    )
+    heading = np.zeros((200, 1))
+
+    ahead, left, _ = twists(plan, np.hstack([before, heading]), np.hstack([after, heading]), 1.0).T
+
+    unit = plan.lattice.units_per_m
+    for number, move in enumerate(zip(before, after, strict=True)):
+        x, y = plan.lattice.to_lattice(np.array(move)).T.copy()
+        poses = Poses(x, y, np.zeros_like(x), np.zeros(2, np.uint8))
+        length = sum_moves(poses, plan.portal_ends) / unit
+        assert math.hypot(ahead[number], left[number]) == pytest.approx(length, abs=0.005)

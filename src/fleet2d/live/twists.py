@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def twists(plan: "FloorPlan", before: F64, after: F64, passed_s: float) -> F64:
     """Return mean speeds from pose to pose: ahead, to the left [m/s] and round [rad/s].
 
-    Stairs and lifts have no length: their ends lie side by side in the plan, and far apart.
+    Stairs and lifts have no length, as for `sum_moves`: their ends lie far apart in the plan.
 
     Args:
         plan: The floor plan.
