@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.two_storeys import PLAN
@@ -10,14 +11,14 @@ import fleet2d
 
 
 def verdicts(
-    tmp_path: Path, *, stairs: bool = True, **expected: str
+    tmp_path: Path, *, stairs: bool = True, house: Any = PLAN, **expected: str
 ) -> dict[str, list[tuple[int, int]]]:
     """Return when what is expected of a minute is violated.
 
     Ana stands above, and from second 30 on below; luna above, astro below.
     """
     path = tmp_path / "house.json"
-    plan = PLAN if stairs else {key: PLAN[key] for key in PLAN if key != "portals"}
+    plan = house if stairs else {key: PLAN[key] for key in PLAN if key != "portals"}
     path.write_text(json.dumps(plan))
     robot = {"behaviors": []}
     run = fleet2d.run(
@@ -96,3 +97,18 @@ def test_spans_change_no_distance(tmp_path: Path, max_span: int) -> None:
 
     assert whole.digest == short.digest
     assert whole.tables["violations"].equals(short.tables["violations"])
+
+
+def test_a_garage_that_nothing_joins_is_on_the_storey_beside_it(tmp_path: Path) -> None:
+    corners = [[0, -4], [5, -4], [5, -0.3], [0, -0.3]]
+    garage = {"name": "garage", "type": "garage", "polygon": corners}
+    house = {**PLAN, "free": [*PLAN["free"], corners], "rooms": [*PLAN["rooms"], garage]}
+
+    found = verdicts(
+        tmp_path,
+        house=house,
+        near="always(distance(astro, garage) < 3 m)",
+        far="never(distance(luna, garage) < 30 m)",
+    )
+
+    assert found == {"near": [], "far": []}

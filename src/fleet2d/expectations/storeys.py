@@ -6,23 +6,37 @@ import shapely
 from fleet2d.expectations.expectation import INFINITE, Trace, combine, shortest
 from fleet2d.expectations.signals import SignalBlock
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.kernels import F64, distances_between
+from fleet2d.kernels import F64, I64, distances_between
 
 
 def storey_of(plan: FloorPlan, place: shapely.Geometry) -> int:
-    """Return the number of the part of the free space at which a place is [lattice]."""
-    return int(shapely.distance(np.array(plan.polygons), place).argmin())
+    """Return the number of the storey at which a place is [lattice]; see `_storey_of_part`."""
+    part = shapely.distance(np.array(plan.polygons), place).argmin()
+    return int(_storey_of_part(plan)[part])
+
+
+def _storey_of_part(plan: FloorPlan) -> I64:
+    """Return for each part of the free space the number of one to which stairs lead, the nearest.
+
+    A part that nothing joins, such as a garage, is beside the rest of its storey.
+    """
+    parts = np.array(plan.polygons)
+    ends = shapely.points(plan.portal_ends[:, :4].reshape(-1, 2))
+    with_stairs = np.unique(shapely.distance(parts[:, np.newaxis], ends).argmin(axis=0))
+    nearest = shapely.distance(parts[:, np.newaxis], parts[with_stairs]).argmin(axis=1)
+    return with_stairs[nearest].astype(np.int64)
 
 
 def storeys(block: SignalBlock, row: int) -> Trace:
-    """Return the number of the part of the free space in which a body is."""
+    """Return the number of the storey on which a body is."""
     window = block.bodies.window(block.first, block.end)
     x, y, *_ = window.dense(row, block.first, block.end)
     is_new = np.append(True, (np.diff(x) != 0) | (np.diff(y) != 0))
     start = np.flatnonzero(is_new)
     points = shapely.points(x[start], y[start])
-    parts = np.array(block.home.plan.polygons)
-    number = shapely.distance(parts[:, np.newaxis], points).argmin(axis=0)
+    plan = block.home.plan
+    part = shapely.distance(np.array(plan.polygons)[:, np.newaxis], points).argmin(axis=0)
+    number = _storey_of_part(plan)[part]
     return shortest(start + block.first, number.astype(np.float64), block.end)
 
 
