@@ -63,8 +63,6 @@ FAR_M = 3.0
 ASIDE_CELLS = 4
 ASIDE_TRIES = 12
 VIAS = 8
-
-
 NO_WAIT = np.zeros(1, np.int64)
 
 # Whose motion counts.

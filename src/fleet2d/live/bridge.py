@@ -60,7 +60,7 @@ REACH_M = 1.0
 MAX_PER_STEP = 1000
 # More messages than this, times the bound of a step, aren't even kept until then.
 MAX_WAITING_STEPS = 10
-# So many messages that a body refuses are tried for an earlier one that it takes.
+# A body that refuses its last message of a step gets the one before, up to so many times.
 MAX_TRIED = 100
 # Of so many steps it is kept how late they began: a run may last for months.
 MAX_LATENESS = 100_000
