@@ -111,3 +111,17 @@ print(faults[1] - faults[0])
         int(subprocess.check_output([sys.executable, "-c", code, word])) for word in ("keep", "")
     )
     assert 10 * kept < usual
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux counts the parent's memory, too")
+def test_peak_memory_is_not_that_of_the_process_that_started_this_one() -> None:
+    """Workers of a driver with much memory were replaced after each call."""
+    code = """
+import subprocess, sys
+import numpy as np
+held = np.ones(50_000_000)
+child = "from fleet2d.runtime.memory import peak_memory_mb; print(peak_memory_mb())"
+print(subprocess.check_output([sys.executable, "-c", child], text=True))
+"""
+    peak_mb = float(subprocess.check_output([sys.executable, "-c", code], text=True))
+    assert 5 < peak_mb < 200
