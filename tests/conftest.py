@@ -5,13 +5,12 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
 import hypothesis
 import pytest
-from tests.scenes import Cli
 from tests.thorough import THOROUGH, examples
 
 from fleet2d import cli
@@ -61,7 +60,7 @@ def pytest_collect_file(parent: pytest.Collector) -> Generator[None, Any, Any]:
 
 
 @pytest.fixture(scope="session")
-def shared_data() -> Path:
+def shared_data():
     """The folder of real inputs, which lies beside the repository and isn't part of it."""
     folder = Path(os.environ.get("FLEET2D_SHARED_DATA", _ROOT.parent / "shared" / "data"))
     if not folder.is_dir():
@@ -73,7 +72,7 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _ctrl_c_is_heard() -> Iterator[None]:
+def _ctrl_c_is_heard():
     """Take Ctrl-C here and in processes begun from here, also where the suite's own ignores it.
 
     A shell starts a job in the background with SIGINT ignored, and children inherit that.
@@ -88,9 +87,7 @@ def _ctrl_c_is_heard() -> Iterator[None]:
 
 
 @pytest.fixture
-def fleet2d(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Cli:
+def fleet2d(monkeypatch, capsys, tmp_path):
     """The command line in this process, in an empty folder: (exit code, stdout, stderr)."""
     monkeypatch.chdir(tmp_path)
 

@@ -1,7 +1,5 @@
 """Any plan can be put under the bundled scenario."""
 
-from pathlib import Path
-
 import pytest
 from tests.meshed_homes import plan_files
 from tests.thorough import some
@@ -10,7 +8,7 @@ import fleet2d
 
 
 @pytest.mark.slow
-def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
+def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data):
     plans = plan_files(shared_data)
     for plan in plans:
         overrides = (
@@ -26,7 +24,7 @@ def test_every_houseexpo_plan_is_lived_in_for_a_day(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
+def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data):
     maps = [
         *(("ros", path) for path in sorted((shared_data / "ros_maps").glob("*/map.yaml"))),
         *(("valetudo", path) for path in sorted((shared_data / "valetudo").glob("*.json"))),
@@ -45,7 +43,7 @@ def test_every_map_of_a_robot_is_lived_in_for_a_day(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize(("seed", "area"), some([(5, 110), (11, 30), (12, 60), (13, 150)], 2))
-def test_a_furnished_synthetic_home_is_lived_in_for_a_day(seed: int, area: int) -> None:
+def test_a_furnished_synthetic_home_is_lived_in_for_a_day(seed, area):
     """In the first one a chair stands in a gap that its sitter fits into, but can't walk out of."""
     floorplan = {"type": "synthetic", "seed": seed, "area_m2": area, "furnish": True}
     personas = {"ana": "night_shift", "ben": "works_outside"}

@@ -36,7 +36,7 @@ SMALL = {
 
 
 @pytest.fixture(autouse=True)
-def small_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+def small_bounds(monkeypatch):
     for name, most in SMALL.items():
         monkeypatch.setenv(f"FLEET2D_MAX_{name}", str(most))
 
@@ -100,9 +100,7 @@ def parquet(path: Path, rows: int) -> None:
     ids=["aliases", "brackets", "dashes", "levels", "values", "bytes"],
 )
 @pytest.mark.parametrize("kind", ["scenario", "plan"])
-def test_yaml_that_unfolds_without_end_is_refused_at_once(
-    tmp_path: Path, text: str, variable: str, kind: str
-) -> None:
+def test_yaml_that_unfolds_without_end_is_refused_at_once(tmp_path, text, variable, kind):
     path = tmp_path / "home.yaml"
     path.write_text(text)
     with pytest.raises(InputError, match=f"home.yaml.*set {variable}=") as caught:
@@ -111,14 +109,14 @@ def test_yaml_that_unfolds_without_end_is_refused_at_once(
     assert len(str(caught.value)) < 400
 
 
-def test_merges_of_merges_are_no_more_than_their_keys(tmp_path: Path) -> None:
+def test_merges_of_merges_are_no_more_than_their_keys(tmp_path):
     assert {"x": 1, "y": 2} == parse(MERGES)["a11"]
     path = tmp_path / "home.yaml"
     path.write_text(MERGES)
     assert {"x": 1, "y": 2} == read_document(path).data["a11"]
 
 
-def test_what_is_merged_keeps_its_order_and_its_precedence() -> None:
+def test_what_is_merged_keeps_its_order_and_its_precedence():
     text = "a: &a {x: 1, y: 1}\nb: &b {y: 2, z: 2}\nc: {z: 3, <<: [*a, *b], w: 3}"
     assert {"y": 1, "z": 3, "x": 1, "w": 3} == parse(text)["c"]
 
@@ -141,7 +139,7 @@ def test_what_is_merged_keeps_its_order_and_its_precedence() -> None:
         "a: " + "9" * 5000,
     ],
 )
-def test_odd_yaml_is_refused_with_its_line(tmp_path: Path, text: str) -> None:
+def test_odd_yaml_is_refused_with_its_line(tmp_path, text):
     path = tmp_path / "home.yaml"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
@@ -220,7 +218,7 @@ def bomb(name: str, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
         "fixes.csv",
     ],
 )  # fmt: skip
-def test_a_file_that_unfolds_to_gigabytes_is_refused(tmp_path: Path, name: str) -> None:
+def test_a_file_that_unfolds_to_gigabytes_is_refused(tmp_path, name):
     path, read, bound = bomb(name, tmp_path)
     with pytest.raises(Fleet2DError, match=f"set FLEET2D_MAX_{bound}=") as caught:
         read(path)
@@ -240,9 +238,7 @@ def test_a_file_that_unfolds_to_gigabytes_is_refused(tmp_path: Path, name: str) 
         ("time,x,y\n2020-01-01 00:00:00,1,1\n" + "x" * 5000 + ",1,1\n", "line 3"),
     ],
 )
-def test_a_time_out_of_all_bounds_is_named_with_its_line(
-    tmp_path: Path, text: str, word: str
-) -> None:
+def test_a_time_out_of_all_bounds_is_named_with_its_line(tmp_path, text, word):
     path = tmp_path / "rtls.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=word) as caught:
@@ -250,7 +246,7 @@ def test_a_time_out_of_all_bounds_is_named_with_its_line(
     assert len(str(caught.value)) < 400 + len(str(path))
 
 
-def test_a_heading_in_latin_1_is_no_traceback(tmp_path: Path) -> None:
+def test_a_heading_in_latin_1_is_no_traceback(tmp_path):
     path = tmp_path / "rtls.csv"
     path.write_bytes("zeit,x,y,höhe\n1,2,3,4\n".encode("latin-1"))
     with pytest.raises(InputError, match=r"rtls\.csv.*UTF-8"):
@@ -261,7 +257,7 @@ def test_a_heading_in_latin_1_is_no_traceback(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("read", [read_document, load_floorplan, read_log, load_learned])
-def test_devices_and_pipes_are_no_input(tmp_path: Path, read: Callable[[Path], Any]) -> None:
+def test_devices_and_pipes_are_no_input(tmp_path, read):
     pipe = tmp_path / "plan.yaml"
     os.mkfifo(pipe)
     for path in (pipe, Path("/dev/zero")):
@@ -269,9 +265,7 @@ def test_devices_and_pipes_are_no_input(tmp_path: Path, read: Callable[[Path], A
             read(path)
 
 
-def test_a_bound_is_raised_by_the_environment(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bound_is_raised_by_the_environment(tmp_path, monkeypatch):
     path = tmp_path / "home.yaml"
     path.write_text("[" * 70 + "]" * 70)
     with pytest.raises(InputError, match="FLEET2D_MAX_DEPTH=130"):
@@ -287,7 +281,7 @@ def test_a_bound_is_raised_by_the_environment(
         read_bytes(path, FILE_BYTES)
 
 
-def test_bounds_have_names_of_their_own() -> None:
+def test_bounds_have_names_of_their_own():
     assert len(BOUNDS) == len({bound.variable for bound in BOUNDS})
     assert all(isinstance(bound, Bound) and bound.default > 0 for bound in BOUNDS)
 
@@ -319,7 +313,7 @@ def test_bounds_have_names_of_their_own() -> None:
         "algorithms.ltp.period=" + "9" * 400 + " s",
     ],
 )
-def test_no_message_echoes_more_than_a_line(override: str) -> None:
+def test_no_message_echoes_more_than_a_line(override):
     with pytest.raises(InputError) as caught:
         load_scenario(override)
     for line in str(caught.value).splitlines():
@@ -346,26 +340,24 @@ def test_no_message_echoes_more_than_a_line(override: str) -> None:
         {"speedup": 1e-9},
     ],
 )
-def test_wrong_values_from_python_are_no_tracebacks(settings: dict[str, Any]) -> None:
+def test_wrong_values_from_python_are_no_tracebacks(settings):
     with pytest.raises(InputError):
         load_scenario("bundled:paper", **settings)
 
 
-def test_a_large_manifest_is_not_read(tmp_path: Path) -> None:
+def test_a_large_manifest_is_not_read(tmp_path):
     with (tmp_path / "manifest.json").open("wb") as file:
         file.truncate(1 << 40)
     with pytest.raises(InputError, match="FLEET2D_MAX_FILE_BYTES"):
         Manifest.read(tmp_path)
 
 
-def test_one_line_is_one_line() -> None:
+def test_one_line_is_one_line():
     assert "a b" == one_line("a\n\n\tb")
     assert 60 == len(one_line("x " * 10**6))
 
 
-def test_a_large_file_is_refused_before_it_is_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):
     path = tmp_path / "large"
     path.write_bytes(bytes(SMALL["FILE_BYTES"] + 1))
     monkeypatch.setattr("fleet2d.bounds.open_input", lambda *_: pytest.fail("it was opened"))
@@ -373,7 +365,7 @@ def test_a_large_file_is_refused_before_it_is_read(
         read_bytes(path, FILE_BYTES)
 
 
-def test_a_file_that_has_grown_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_has_grown_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "large"
     path.write_bytes(bytes(SMALL["FILE_BYTES"] + 7))
     monkeypatch.setattr("fleet2d.bounds.check_file", lambda *_: None)

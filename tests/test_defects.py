@@ -2,7 +2,6 @@
 
 from datetime import timedelta
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 
 
-def test_room_sampling_logs_no_return_that_did_not_happen() -> None:
+def test_room_sampling_logs_no_return_that_did_not_happen():
     shares = {"living_room": 1, "away": 3}
     ana = {"type": "room_sampling", "shares": shares, "dwell": "20 min"}
     stored = run(scenario("5 d", users={"ana": ana}))
@@ -35,7 +34,7 @@ def test_room_sampling_logs_no_return_that_did_not_happen() -> None:
 
 
 @pytest.mark.parametrize(("step", "good"), [("2 s", False), ("1 s", True), ("2.5 s", True)])
-def test_lost_after_that_is_no_multiple_of_the_step_is_refused(step: str, good: bool) -> None:
+def test_lost_after_that_is_no_multiple_of_the_step_is_refused(step, good):
     content = home_with([{"type": "patrol"}], astro={"camera": {"lost_after": "5 s"}})
     content["simulation"]["step"] = step
     if good:
@@ -45,13 +44,13 @@ def test_lost_after_that_is_no_multiple_of_the_step_is_refused(step: str, good: 
         Simulation(content)
 
 
-def test_lost_after_left_out_goes_with_every_step() -> None:
+def test_lost_after_left_out_goes_with_every_step():
     content = home_with([{"type": "patrol"}], astro={"camera": {}})
     content["simulation"]["step"] = "2 s"
     Simulation(content)
 
 
-def test_find_keeps_its_distance_from_who_is_already_near() -> None:
+def test_find_keeps_its_distance_from_who_is_already_near():
     """It looked round, saw the user 0.7 m off, and stayed there for as long as it stays."""
     sits = {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [1.7, 3.0]}]}]}
     find = {"type": "find", "user": "ana", "every": "5 min", "distance": "1.2 m", "stay": "4 min"}
@@ -64,7 +63,7 @@ def test_find_keeps_its_distance_from_who_is_already_near() -> None:
     assert apart.min() >= 1.19
 
 
-def test_show_of_a_run_does_not_ignore_step(tmp_path: Path) -> None:
+def test_show_of_a_run_does_not_ignore_step(tmp_path):
     fleet2d.run(scenario("1 min", users={"ana": {"type": "meander"}}), out=tmp_path / "run")
     result = CliRunner().invoke(app, ["show", str(tmp_path / "run"), "--step", "3"])
     assert isinstance(result.exception, InputError)
@@ -72,7 +71,7 @@ def test_show_of_a_run_does_not_ignore_step(tmp_path: Path) -> None:
     assert not (tmp_path / "run" / "picture.png").exists()
 
 
-def test_show_of_a_run_that_is_not_there_speaks_of_runs() -> None:
+def test_show_of_a_run_that_is_not_there_speaks_of_runs():
     result = CliRunner().invoke(app, ["show", "runs/nothing"])
     assert isinstance(result.exception, InputError)
     assert "runs/nothing" in str(result.exception)
@@ -80,14 +79,14 @@ def test_show_of_a_run_that_is_not_there_speaks_of_runs() -> None:
     assert "floorplan.path" not in str(result.exception)
 
 
-def test_path_every_wants_a_timedelta() -> None:
+def test_path_every_wants_a_timedelta():
     stored = run(scenario("1 min", users={"ana": {"type": "meander"}}))
     assert 6 == len(stored.path("ana", every=timedelta(seconds=10)).step)
     with pytest.raises(ArtifactError, match=r"every: 1 has no unit"):
         stored.path("ana", every=1)  # type: ignore[arg-type]
 
 
-def test_sums_of_a_wrong_width_name_the_line_of_the_user() -> None:
+def test_sums_of_a_wrong_width_name_the_line_of_the_user():
     class Own(SightingShare):
         def sums(self, evidence: Evidence) -> Any:
             return np.zeros((len(evidence), self.users + 1, 1))
@@ -99,16 +98,14 @@ def test_sums_of_a_wrong_width_name_the_line_of_the_user() -> None:
         own.observe(evidence)
 
 
-def test_shutting_a_doorway_without_a_door_says_how_to_hang_one() -> None:
+def test_shutting_a_doorway_without_a_door_says_how_to_hang_one():
     content = {**scenario("1 min"), "floorplan": {"type": "bundled"}}
     content["script"] = [{"at": "10 s", "shut": "bathroom_1"}]
     with pytest.raises(InputError, match=r"objects: \{bathroom_1: \{type: door, doorway: bed"):
         Simulation(content)
 
 
-def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(monkeypatch):
     """15 s for two days: each reaction planned the rest of the day anew, each look of the robot."""
     work = {"legs": 0, "looks": 0}
 

@@ -105,16 +105,14 @@ def run_notebook(page: Path) -> None:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", pages_with("python"))
-def test_python_of_a_page_runs_in_an_empty_folder(
-    page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_python_of_a_page_runs_in_an_empty_folder(page, folder, monkeypatch):
     if page.stem == "gym":
         pytest.importorskip("gymnasium", reason="needs the extra gym")
         pytest.importorskip("pettingzoo", reason="needs the extra gym")
@@ -126,7 +124,7 @@ def test_python_of_a_page_runs_in_an_empty_folder(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("block", scenarios())
-def test_scenario_of_a_page_can_be_simulated(block: Block, folder: Path) -> None:
+def test_scenario_of_a_page_can_be_simulated(block, folder):
     write_titled_blocks(block.page, folder)
     if block.page.name == "floorplans.md":
         run_notebook(block.page)  # writes the plan that the scenario names
@@ -138,7 +136,7 @@ def test_scenario_of_a_page_can_be_simulated(block: Block, folder: Path) -> None
 
 
 @pytest.mark.parametrize("words", commands())
-def test_command_of_a_page_exists_with_its_options(words: list[str]) -> None:
+def test_command_of_a_page_exists_with_its_options(words):
     group = typer.main.get_command(app)
     command = group.get_command(typer.Context(group), words[0])  # of entry points, too
     assert command is not None
@@ -152,14 +150,14 @@ def test_command_of_a_page_exists_with_its_options(words: list[str]) -> None:
 
 
 @pytest.mark.parametrize("page", TEXTS)
-def test_links_of_a_page_lead_somewhere(page: Path) -> None:
+def test_links_of_a_page_lead_somewhere(page):
     links = LINK.findall(page.read_text(encoding="utf-8"))
     local = [link for link in links if not link.startswith(("http:", "https:"))]
     assert [] == [link for link in local if not (page.parent / link).exists()]
 
 
 @pytest.mark.parametrize("page", TEXTS)
-def test_anchors_of_a_page_are_headings(page: Path) -> None:
+def test_anchors_of_a_page_are_headings(page):
     links = re.findall(r"\]\(([^)#\s]*\.md)?#([^)\s]+)\)", page.read_text(encoding="utf-8"))
     wrong = [
         (name, anchor)
@@ -178,7 +176,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in plain}
 
 
-def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> None:
+def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says():
     """Up to a quarter of an hour nobody by more than 0.03, of people simulated or real."""
     text = text_of("paper")
     tables = [part.split("\n\n")[0] for part in re.split(r"(?=\| learned \| 0\.9)", text)[1:]]
@@ -191,7 +189,7 @@ def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says() -> N
         assert all(0 <= round(best[i] - naive[i], 2) <= 0.03 for i in (1, 2))
 
 
-def test_concepts_deny_nothing_that_there_is() -> None:
+def test_concepts_deny_nothing_that_there_is():
     text = text_of("concepts")
     for denial in ("no furniture", "no doors", "no false detections", "don't react to the robot"):
         assert denial not in text
@@ -202,7 +200,7 @@ NOT_RUN = {"view", "fit", "convert"}
 
 
 @pytest.mark.slow
-def test_commands_of_the_command_line_page_run_in_its_folder(folder: Path) -> None:
+def test_commands_of_the_command_line_page_run_in_its_folder(folder):
     """All that need nothing but the page's own file, in order, at a day instead of sixty."""
     commands = page_of("cli")
     write_titled_blocks(commands, folder)

@@ -4,13 +4,12 @@ import re
 from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
 from pydantic import TypeAdapter
 from tests.pages import text_of as page
-from tests.scenes import Cli, run, table
+from tests.scenes import run, table
 
 import fleet2d
 from fleet2d import History, Plan, Present, Situation
@@ -38,7 +37,7 @@ def names(cell: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def day() -> fleet2d.Run:
+def day():
     return fleet2d.run("bundled:paper", "simulation.duration=1 d", seed=4)
 
 
@@ -56,7 +55,7 @@ def day() -> fleet2d.Run:
         ("share", Share),
     ],
 )
-def test_units_of_a_quantity_are_read(quantity: str, kind: Any) -> None:
+def test_units_of_a_quantity_are_read(quantity, kind):
     cells = next(c for c in rows(page("scenario"), "| quantity |") if c[0].startswith(quantity))
     literals = re.findall(r"`([^`]+)`", cells[2])
     assert literals
@@ -64,7 +63,7 @@ def test_units_of_a_quantity_are_read(quantity: str, kind: Any) -> None:
         assert TypeAdapter(kind).validate_python(yaml.safe_load(literal)) is not None
 
 
-def test_only_the_duration_and_the_floor_plan_are_required() -> None:
+def test_only_the_duration_and_the_floor_plan_are_required():
     least = {"simulation": {"duration": "1 min"}, "floorplan": "bundled"}
     assert 60 == fleet2d.load_scenario(least).simulation.steps
     for section in least:
@@ -72,7 +71,7 @@ def test_only_the_duration_and_the_floor_plan_are_required() -> None:
             fleet2d.load_scenario({k: v for k, v in least.items() if k != section})
 
 
-def test_durations_in_mappings_merge_and_as_text_replace() -> None:
+def test_durations_in_mappings_merge_and_as_text_replace():
     base = {"extends": "bundled:paper"}
     merged = fleet2d.load_scenario({**base, "simulation": {"duration": {"hours": 2}}})
     assert timedelta(days=30, hours=2) == merged.simulation.duration
@@ -83,14 +82,14 @@ def test_durations_in_mappings_merge_and_as_text_replace() -> None:
 # Concepts
 
 
-def test_the_lattice_and_headings_have_the_sizes_of_the_page() -> None:
+def test_the_lattice_and_headings_have_the_sizes_of_the_page():
     text = page("concepts")
     assert f"{SUB} units to a cell" in text
     assert f"{1000 * 0.05 / SUB:.2f} mm" in text
     assert f"{TURN}ths of a turn" in text
 
 
-def test_a_run_has_as_many_full_steps_as_fit() -> None:
+def test_a_run_has_as_many_full_steps_as_fit():
     assert (
         3
         == fleet2d.load_scenario(
@@ -102,7 +101,7 @@ def test_a_run_has_as_many_full_steps_as_fit() -> None:
 # What a run stores
 
 
-def test_columns_of_the_stored_tables_are_those_of_the_page(day: fleet2d.Run) -> None:
+def test_columns_of_the_stored_tables_are_those_of_the_page(day):
     text = page("artifacts")
     for name in ("trajectories", "key_frames", "observations", "events"):
         part = text[text.index(f"**{name}**") :]
@@ -114,7 +113,7 @@ def test_columns_of_the_stored_tables_are_those_of_the_page(day: fleet2d.Run) ->
         assert set() == extra, name
 
 
-def test_columns_with_the_truth_are_there_if_a_camera_can_err() -> None:
+def test_columns_with_the_truth_are_there_if_a_camera_can_err():
     cells = next(c for c in rows(page("artifacts"), "| column | unit | |") if "entity" in c[0])
     assert cells
     erring = run({"extends": "bundled:paper"}, "simulation.duration=3 h",
@@ -127,7 +126,7 @@ def test_columns_with_the_truth_are_there_if_a_camera_can_err() -> None:
     assert {"true_user", "true_x", "true_activity", "activity"} <= columns
 
 
-def test_keys_of_the_manifest_are_those_of_the_page(day: fleet2d.Run) -> None:
+def test_keys_of_the_manifest_are_those_of_the_page(day):
     part = page("artifacts")
     part = part[part.index("## The manifest") :]
     said = {name for cells in rows(part, "| key | |") for name in names(cells[0])}
@@ -147,7 +146,7 @@ def test_keys_of_the_manifest_are_those_of_the_page(day: fleet2d.Run) -> None:
         ("algorithms", "`state` has", Present),
     ],
 )
-def test_what_the_page_lists_exists(where: str, begin: str, subject: type) -> None:
+def test_what_the_page_lists_exists(where, begin, subject):
     has = {*dir(subject), *getattr(subject, "__dataclass_fields__", {})}
     part = page(where).split(begin, 1)[1].split(". ", 1)[0].split(";", 1)[0]
     listed = [name for name in names(part) if name not in {"needs", "looks_back"}]
@@ -158,7 +157,7 @@ def test_what_the_page_lists_exists(where: str, begin: str, subject: type) -> No
 # Commands
 
 
-def test_json_has_the_keys_of_the_page(fleet2d: Cli) -> None:
+def test_json_has_the_keys_of_the_page(fleet2d):
     code, out, _ = fleet2d(
         "run", "bundled:paper", "simulation.duration=10 min", "--json", "--out", "ten"
     )
@@ -172,16 +171,14 @@ def test_json_has_the_keys_of_the_page(fleet2d: Cli) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("plan", ["synthetic:7", "family_home"])
-def test_commands_that_take_a_floor_plan_take_bundled_and_synthetic_ones(
-    fleet2d: Cli, plan: str
-) -> None:
+def test_commands_that_take_a_floor_plan_take_bundled_and_synthetic_ones(fleet2d, plan):
     assert 0 == fleet2d("validate", plan)[0]
     assert 0 == fleet2d("convert", plan, "plan.json")[0]
     assert 0 == fleet2d("show", plan, "--out", "plan.svg")[0]
 
 
 @pytest.mark.slow
-def test_the_bundled_month_is_as_the_pages_say() -> None:
+def test_the_bundled_month_is_as_the_pages_say():
     """Its error of presence after the month, and the rounds that the robot makes."""
     month = run({"extends": "bundled:paper"})
     said = re.search(r"printed by `fleet2d run`: (0\.\d+) after the month", page("presence"))
@@ -189,7 +186,7 @@ def test_the_bundled_month_is_as_the_pages_say() -> None:
     assert float(said[1]) == pytest.approx(month.metrics["ltp_error"]["ana"]["tv"], abs=0.0005)
 
 
-def test_people_of_different_households_ignore_each_other() -> None:
+def test_people_of_different_households_ignore_each_other():
     alone = {"ana": {"type": "routine", "persona": "retired"}}
     both = {**alone, "ben": {"type": "routine", "persona": "student"}}
     settings = {"simulation": {"duration": "1 d", "seed": 4}, "robots": {}}
@@ -204,7 +201,7 @@ def test_people_of_different_households_ignore_each_other() -> None:
 # Interventions, tests, studies, security
 
 
-def test_messages_of_the_page_of_interventions_are_those_of_the_program(fleet2d: Cli) -> None:
+def test_messages_of_the_page_of_interventions_are_those_of_the_program(fleet2d):
     """Each wrong value is put into the page's own file; a message ends where the page has …"""
     text = page("interventions")
     scenario = re.search(r"```yaml title=evening.yaml\n(.*?)```", text, re.DOTALL)
@@ -226,7 +223,7 @@ def test_messages_of_the_page_of_interventions_are_those_of_the_program(fleet2d:
         assert message.startswith(line.removesuffix(" …"))
 
 
-def test_interventions_of_the_page_exist() -> None:
+def test_interventions_of_the_page_exist():
     text = page("interventions")
     part = text[text.index("## Kinds of interventions") : text.index("## Errors before the run")]
     cells = [line.split("|")[1] for line in part.splitlines() if line.startswith("| `")]
@@ -236,7 +233,7 @@ def test_interventions_of_the_page_exist() -> None:
     assert set(verbs()) - listed == {"decide", "drive", "switch_on"}  # by Python alone
 
 
-def test_rates_that_seeds_can_tell_apart_are_as_the_page_says() -> None:
+def test_rates_that_seeds_can_tell_apart_are_as_the_page_says():
     text = page("product-tests")
     said = re.search(r"30 tell 90 % from (\d+) %, 100 from (\d+) %, 300 from (\d+) %", text)
     assert said is not None
@@ -246,12 +243,12 @@ def test_rates_that_seeds_can_tell_apart_are_as_the_page_says() -> None:
     assert f"{100 * rate_test(100, 0.95).alternative:.1f} %" in text
 
 
-def test_keys_of_a_study_are_those_of_the_page() -> None:
+def test_keys_of_a_study_are_those_of_the_page():
     said = {n for cells in rows(page("studies"), "| key | |") for n in names(cells[0])}
     assert set(StudyFile.model_fields) == said
 
 
-def test_what_the_paper_page_says_of_the_feedback_loop_is_in_its_table() -> None:
+def test_what_the_paper_page_says_of_the_feedback_loop_is_in_its_table():
     """The error of `likelihood` where all rooms are looked into, and of `audit_only` with rounds."""
     text = page("paper")
     errors = {
@@ -271,21 +268,21 @@ def test_what_the_paper_page_says_of_the_feedback_loop_is_in_its_table() -> None
 # Homes, expectations
 
 
-def test_keys_of_floor_plans_are_those_of_the_page() -> None:
+def test_keys_of_floor_plans_are_those_of_the_page():
     for cells in rows(page("floorplans"), "| type | keys |"):
         (kind,) = names(cells[0])
         model = lookup("floorplan", kind)
         assert set(names(cells[1])) <= set(model.model_fields), kind
 
 
-def test_the_bundled_home_is_as_large_as_the_page_says() -> None:
+def test_the_bundled_home_is_as_large_as_the_page_says():
     said = re.search(r"a home of (\d+) m² and (\d+) rooms", page("floorplans"))
     assert said is not None
     plan = fleet2d.load_floorplan()
     assert (round(plan.area_m2), len(plan.rooms)) == (int(said[1]), int(said[2]))
 
 
-def test_expectations_of_the_page_are_read() -> None:
+def test_expectations_of_the_page_are_read():
     text = page("expectations")
     written = [
         re.findall(r"`([^`]+)`", cells[1])[0] for cells in rows(text, "| to expect that | write |")

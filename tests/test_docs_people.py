@@ -51,11 +51,11 @@ def agrees(said: str, value: float, printed_to: float = 0.0) -> bool:
 
 
 @pytest.fixture(scope="module")
-def data(shared_data: Path) -> str:
+def data(shared_data):
     return str(shared_data / "activity")
 
 
-def test_measures_of_days_are_those_of_the_page(data: str) -> None:
+def test_measures_of_days_are_those_of_the_page(data):
     lines = printed("people", "measures", "--data", data)
     found = {re.split(r"  +", line)[0]: re.findall(r"\d+\.\d+|nan", line) for line in lines[4:23]}
     columns = (3, 4, 5, 6, 13, 14, 15, 16, 17, 18, 19, 20, 23)
@@ -68,19 +68,19 @@ def test_measures_of_days_are_those_of_the_page(data: str) -> None:
             assert not cell or agrees(cell, float(found[key][column]), 0.01), (key, column)
 
 
-def test_begins_of_activities_are_as_likely_as_the_page_says(data: str) -> None:
+def test_begins_of_activities_are_as_likely_as_the_page_says(data):
     *_, last = printed("people", "held-out", "--data", f"{data}/atus_2022_2023")
     assert ["2.71", "2.83", "2.63"] == [f"{float(x):.2f}" for x in last.split()[1:]]
 
 
-def test_visits_are_those_of_the_page(data: str) -> None:
+def test_visits_are_those_of_the_page(data):
     lines = printed("people", "visits", "--data", data)
     found = {line[:18].strip(): NUMBER.findall(line[18:]) for line in lines[3:14]}
     for name, cells in rows("routines", "| mean (lowest to highest day)"):
         assert found[name] == NUMBER.findall(" ".join(cells)), name
 
 
-def test_the_population_is_as_near_to_the_survey_as_the_page_says() -> None:
+def test_the_population_is_as_near_to_the_survey_as_the_page_says():
     for options, said in (
         ((), ["0.012", "0.045"]),
         (("--people", "4000", "--weeks", "4"), ["0.003", "0.009"]),
@@ -89,7 +89,7 @@ def test_the_population_is_as_near_to_the_survey_as_the_page_says() -> None:
         assert said == [f"{float(value):.3f}" for value in last.split()[1:]]
 
 
-def test_shares_of_rooms_are_as_near_as_the_page_says() -> None:
+def test_shares_of_rooms_are_as_near_as_the_page_says():
     lines = [line.split() for line in printed("people", "rooms")[1:]]
     errors = {int(day): [f"{float(x):.3f}" for x in found] for day, *found in lines}
     assert [
@@ -103,7 +103,7 @@ def overlaps(*arguments: str) -> dict[str, list[str]]:
     return {" ".join(words[1:-4]): words[-4:-1] for words in lines}
 
 
-def test_people_are_in_each_others_way_as_often_as_the_page_says() -> None:
+def test_people_are_in_each_others_way_as_often_as_the_page_says():
     found = overlaps()
     assert "225" == found["null"][1]
     assert ["48", "352"] == found["3 s"][1:]
@@ -112,9 +112,7 @@ def test_people_are_in_each_others_way_as_often_as_the_page_says() -> None:
     assert ["668", "368403"] == [overlaps(flat)["null"][0], overlaps(flat, *own)["null"][0]]
 
 
-def test_patrols_that_stop_where_they_see_err_as_the_page_says(
-    shared_data: Path, tmp_path: Path
-) -> None:
+def test_patrols_that_stop_where_they_see_err_as_the_page_says(shared_data, tmp_path):
     shutil.copytree(ROOT / "examples/studies", tmp_path / "studies")
     (tmp_path / "studies/houseexpo").symlink_to(shared_data / "houseexpo")
     found = fleet2d.study(tmp_path / "studies/presence_views.yaml", tmp_path / "views").complete
@@ -131,7 +129,7 @@ def test_patrols_that_stop_where_they_see_err_as_the_page_says(
     assert ["0.468", "0.051"] == [f"{error:.3f}" for error in errors]
 
 
-def test_after_events_of_a_year_estimators_err_as_the_page_says(tmp_path: Path) -> None:
+def test_after_events_of_a_year_estimators_err_as_the_page_says(tmp_path):
     found = fleet2d.study(ROOT / "examples/studies/presence_year.yaml", tmp_path / "year").complete
     columns = ("exposure_ratio", "exposure_ratio_14", "likelihood", "likelihood_14", "likelihood_5")
     for event, cells in rows("estimators", "| event | `exposure_ratio`"):
@@ -144,9 +142,7 @@ def test_after_events_of_a_year_estimators_err_as_the_page_says(tmp_path: Path) 
             assert all(map(agrees, said, (mean.mean, mean.low, mean.high))), (event, column, mean)
 
 
-def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(
-    data: str, tmp_path: Path
-) -> None:
+def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(data, tmp_path):
     text = "\n".join(printed("fit", "--data", data, "--out", str(tmp_path)))
     logs = iter(text.split("\n## ")[1:])
     starts = {

@@ -55,13 +55,13 @@ def words(text: str) -> int:
     return len(re.findall(r"[^\s|]*[^\W\d_][^\s|]*", text))
 
 
-def test_words_are_counted_without_code_links_and_tables_of_tools() -> None:
+def test_words_are_counted_without_code_links_and_tables_of_tools():
     made = "<!-- licences: made by x -->\n| a | b |\n<!-- end of licences -->"
     text = f"Two [words](of/a/page.md), not `code`.\n```sh\nrun it\n```\n{made}\n| 1 | 2.5 |\n"
     assert 3 == words(text)
 
 
-def test_people_wrote_no_more_words_than_a_reader_has_patience_for() -> None:
+def test_people_wrote_no_more_words_than_a_reader_has_patience_for():
     made = {page for page in PAGES if "Made by `python" in page.read_text(encoding="utf-8")[:200]}
     pages = [page.read_text(encoding="utf-8") for page in {*PAGES[1:]} - made]
     cells = [cell for path in NOTEBOOKS for cell in json.loads(path.read_text("utf-8"))["cells"]]
@@ -69,25 +69,25 @@ def test_people_wrote_no_more_words_than_a_reader_has_patience_for() -> None:
     assert MOST_WORDS >= sum(map(words, pages))
 
 
-def test_each_page_is_of_one_kind_and_has_a_place_in_the_navigation() -> None:
+def test_each_page_is_of_one_kind_and_has_a_place_in_the_navigation():
     pages = {page.relative_to(DOCS) for page in [*PAGES[1:], *NOTEBOOKS]}
     assert {"index.md", "gallery.md"} == {str(page) for page in pages if page.parts[0] not in KINDS}
     named = {page.removesuffix(".md") for page in nav()}
     assert set() == {page.with_suffix("").as_posix() for page in pages} - named
 
 
-def test_navigation_names_no_page_twice() -> None:
+def test_navigation_names_no_page_twice():
     assert len(nav()) == len(set(nav()))
 
 
 @pytest.mark.slow
-def test_navigation_names_each_page_that_is_written_or_made() -> None:
+def test_navigation_names_each_page_that_is_written_or_made():
     pages = {**written(), **site.generated_pages()}
     assert all(pages.values())
     assert set(nav()) == {uri for uri in pages if uri.endswith(".md")}
 
 
-def test_site_has_a_notebook_of_each_tutorial_and_of_each_guide_with_python() -> None:
+def test_site_has_a_notebook_of_each_tutorial_and_of_each_guide_with_python():
     pages = written()
     notebooks = {Path(uri).stem: uri for uri in pages if uri.endswith(".ipynb")}
     assert set(sources()) == set(notebooks)
@@ -99,7 +99,7 @@ def test_site_has_a_notebook_of_each_tutorial_and_of_each_guide_with_python() ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", [pytest.param(p, id=p.stem) for p in NOTEBOOKS])
-def test_a_tutorial_prints_and_draws_what_it_stores(path: Path) -> None:
+def test_a_tutorial_prints_and_draws_what_it_stores(path):
     command = [sys.executable, "-m", "tools.tutorials", path.stem, "--check"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment())
     assert (0, "") == (done.returncode, done.stdout.strip()), done.stderr[-2000:]
@@ -110,7 +110,7 @@ def environment() -> dict[str, str]:
     return {**os.environ, "COLUMNS": "80", "POLARS_FMT_MAX_COLS": "8"}
 
 
-def test_each_tutorial_shows_a_picture_and_is_for_a_role() -> None:
+def test_each_tutorial_shows_a_picture_and_is_for_a_role():
     assert 4 == len(NOTEBOOKS)
     for path in NOTEBOOKS:
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
@@ -122,17 +122,17 @@ def test_each_tutorial_shows_a_picture_and_is_for_a_role() -> None:
 # The gallery
 
 
-def test_gallery_has_at_least_twelve_homes_and_scenarios() -> None:
+def test_gallery_has_at_least_twelve_homes_and_scenarios():
     assert 12 <= len(gallery.PIECES)
     assert all((gallery.IMAGES / f"{piece.name}.webp").is_file() for piece in gallery.PIECES)
 
 
-def test_page_of_the_gallery_is_that_of_its_pieces() -> None:
+def test_page_of_the_gallery_is_that_of_its_pieces():
     page = (DOCS / "gallery.md").read_text(encoding="utf-8")
     assert gallery.page() == page, "run python -m tools.gallery"
 
 
-def test_first_page_and_gallery_lead_to_each_day_of_the_gallery_live() -> None:
+def test_first_page_and_gallery_lead_to_each_day_of_the_gallery_live():
     days = [f"live/{piece.name}.html" for piece in gallery.PIECES if piece.at is not None]
     pages = {uri: str(text) for uri, text in written().items()}
     assert ["month.html", *days] == re.findall(r'<option value="([^"]*)"', pages["index.md"])
@@ -141,7 +141,7 @@ def test_first_page_and_gallery_lead_to_each_day_of_the_gallery_live() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("piece", [pytest.param(p, id=p.name) for p in gallery.PIECES])
-def test_a_picture_of_the_gallery_shows_the_home_or_run_of_today(piece: gallery.Piece) -> None:
+def test_a_picture_of_the_gallery_shows_the_home_or_run_of_today(piece):
     digests = json.loads(gallery.DIGESTS.read_text(encoding="utf-8"))
     digest = gallery.digest_of(gallery.open_piece(piece))
     assert digest == digests[piece.name], "run python -m tools.gallery"
@@ -149,12 +149,12 @@ def test_a_picture_of_the_gallery_shows_the_home_or_run_of_today(piece: gallery.
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", gallery.FIGURES)
-def test_a_figure_of_a_page_shows_the_run_of_today(name: str) -> None:
+def test_a_figure_of_a_page_shows_the_run_of_today(name):
     digests = json.loads(gallery.DIGESTS.read_text(encoding="utf-8"))
     assert gallery.run_figure(name).digest == digests[name], "run python -m tools.gallery"
 
 
-def test_every_picture_is_shown_by_a_page() -> None:
+def test_every_picture_is_shown_by_a_page():
     shown = {name for page in PAGES for name in re.findall(r"images/([\w./]+)\)", page.read_text())}
     files = {path.relative_to(DOCS / "images") for path in (DOCS / "images").rglob("*.*")}
     assert set() == {path.as_posix() for path in files if path.suffix != ".json"} - shown
@@ -163,7 +163,7 @@ def test_every_picture_is_shown_by_a_page() -> None:
 # Tools
 
 
-def test_examples_of_docstrings_become_code() -> None:
+def test_examples_of_docstrings_become_code():
     pytest.importorskip("griffe", reason="needs the extra docs")
     docstrings = importlib.import_module("tools.docstrings")
     text = "Add.\n\n    >>> 1 + 1\n    2\n\nArgs:\n    a: [b]."
@@ -172,9 +172,7 @@ def test_examples_of_docstrings_become_code() -> None:
     )
 
 
-def test_a_version_of_the_site_joins_the_others_and_the_root_leads_to_the_newest(
-    tmp_path: Path,
-) -> None:
+def test_a_version_of_the_site_joins_the_others_and_the_root_leads_to_the_newest(tmp_path):
     own, sites = tmp_path / "site", tmp_path / "sites"
     for folder in (own, sites):
         folder.mkdir()

@@ -36,13 +36,13 @@ def rows_below(heading: str) -> list[list[str]]:
     return [[part.strip() for part in row.strip("|").split("|")] for row in rows]
 
 
-def test_the_other_behaviors_of_robots_exist() -> None:
+def test_the_other_behaviors_of_robots_exist():
     names = [name for cells in rows_below("| type | does |") for name in cells[0].split("`")[1::2]]
     assert 10 <= len(names)
     assert set() == set(names) - components("behavior").keys()
 
 
-def test_keys_of_drives_exist_with_their_defaults() -> None:
+def test_keys_of_drives_exist_with_their_defaults():
     wrong = []
     for name, _, cell in rows_below("| type | moves | keys (default) |"):
         model = lookup("drive", name.split("`")[1])
@@ -53,7 +53,7 @@ def test_keys_of_drives_exist_with_their_defaults() -> None:
     assert [] == wrong
 
 
-def test_page_on_security_says_of_every_command_whether_it_runs_code() -> None:
+def test_page_on_security_says_of_every_command_whether_it_runs_code():
     text = text_of("security")
     table = text.split("| command | runs code", 1)[1].split("\n\n", 1)[0]
     group = typer.main.get_command(app)
@@ -64,7 +64,7 @@ def test_page_on_security_says_of_every_command_whether_it_runs_code() -> None:
     assert not missing, f"add to the table in docs/explanation/security.md: {sorted(missing)}"
 
 
-def test_each_line_of_the_threat_model_names_its_tests() -> None:
+def test_each_line_of_the_threat_model_names_its_tests():
     text = text_of("security")
     table = text.split("| defended | against | test |\n| --- | --- | --- |\n", 1)[1]
     tests = ROOT / "tests"

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from tests.scenes import Cli
 from tests.thorough import THOROUGH
 
 from fleet2d.learning.datasets.specification import plan_dataset
@@ -37,14 +36,14 @@ SCENARIOS = sorted(set(EXAMPLES.rglob("*.yaml")) - OTHERS)
 
 
 @pytest.fixture
-def examples(tmp_path: Path) -> Path:
+def examples(tmp_path):
     """A copy of the examples, in which nothing of the repository can be written over."""
     return shutil.copytree(
         EXAMPLES, tmp_path / "examples", ignore=shutil.ignore_patterns("__pycache__")
     )
 
 
-def test_there_are_examples_of_an_own_behavior_and_an_own_algorithm() -> None:
+def test_there_are_examples_of_an_own_behavior_and_an_own_algorithm():
     sources = [path.read_text() for path in SCRIPTS]
     assert any("(Behavior)" in source for source in sources)
     assert any("(Algorithm)" in source for source in sources)
@@ -54,12 +53,7 @@ def test_there_are_examples_of_an_own_behavior_and_an_own_algorithm() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", RUNNABLE, ids=lambda path: path.name)
-def test_a_script_runs(
-    examples: Path,
-    path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_a_script_runs(examples, path, monkeypatch, capfd):
     script = examples / path.relative_to(EXAMPLES)
     fewer = ["1" if path.stem == "compare_find" else "2"]  # days, seeds or homes
     if "sys.argv" not in script.read_text():
@@ -77,7 +71,7 @@ def test_a_script_runs(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: str(path.relative_to(EXAMPLES)))
-def test_a_scenario_runs_from_anywhere(fleet2d: Cli, examples: Path, path: Path) -> None:
+def test_a_scenario_runs_from_anywhere(fleet2d, examples, path):
     content = yaml.safe_load(path.read_text())
     duration = content.get("simulation", {}).get("duration", {"days": 30})
     is_long = duration in ({"days": 4}, {"days": 7}, {"days": 28}, {"days": 30})
@@ -92,7 +86,7 @@ def test_a_scenario_runs_from_anywhere(fleet2d: Cli, examples: Path, path: Path)
 
 
 @pytest.fixture
-def complete(examples: Path, path: Path, request: pytest.FixtureRequest) -> Path:
+def complete(examples, path, request):
     """A file of the examples, with the data beside it that its first lines name."""
     file = examples / path.relative_to(EXAMPLES)
     for name, folder in (("logs", "activity"), ("houseexpo", "houseexpo")):
@@ -103,16 +97,14 @@ def complete(examples: Path, path: Path, request: pytest.FixtureRequest) -> Path
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", DATA_SETS, ids=lambda path: path.name)
-def test_a_data_set_has_fitting_homes_and_households(
-    complete: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_data_set_has_fitting_homes_and_households(complete, monkeypatch):
     monkeypatch.chdir(complete.parent)
     plan_dataset(complete)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
-def test_a_study_is_as_it_should_be(complete: Path) -> None:
+def test_a_study_is_as_it_should_be(complete):
     checked = check_study(complete)
     assert len(checked.plan.variants) > 10
     assert checked.specification.file.compare or checked.specification.file.tune
@@ -121,7 +113,7 @@ def test_a_study_is_as_it_should_be(complete: Path) -> None:
 @pytest.mark.parametrize(
     "path", [*SCRIPTS, *SCENARIOS, *STUDIES], ids=lambda path: str(path.relative_to(EXAMPLES))
 )
-def test_an_example_begins_by_saying_what_it_is(path: Path) -> None:
+def test_an_example_begins_by_saying_what_it_is(path):
     first = path.read_text().splitlines()[0]
     assert first.startswith(('"""', "# "))
     assert len(first) > 20

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,7 @@ from fleet2d.studies.design import Design, build_design
 from fleet2d.studies.specification import read_specification
 
 
-def test_estimates_keep_the_order_of_rows_and_hold_their_mean() -> None:
+def test_estimates_keep_the_order_of_rows_and_hold_their_mean():
     rows = pl.DataFrame(
         {"robot": ["b"] * 4 + ["a"], "model": ["x"] * 5, "value": [0.1, 0.4, 0.2, 0.9, 0.5]}
     )
@@ -52,7 +51,7 @@ def test_estimates_keep_the_order_of_rows_and_hold_their_mean() -> None:
     assert np.isnan(single["low"])
 
 
-def test_a_table_leaves_cells_without_a_mean_empty() -> None:
+def test_a_table_leaves_cells_without_a_mean_empty():
     means = pl.DataFrame(
         [("semi_markov", "all", 0.5, 0.4, 0.6)],
         ["model", "gap", "mean", "low", "high"],
@@ -63,27 +62,27 @@ def test_a_table_leaves_cells_without_a_mean_empty() -> None:
     assert [["semi markov"], [""], ["0.500"]] == [list(column.cells) for column in table.columns]
 
 
-def test_words_of_a_table_are_at_the_left_and_numbers_at_the_right() -> None:
+def test_words_of_a_table_are_at_the_left_and_numbers_at_the_right():
     columns = table_of(
         "feedback", ("policy", "gap", PAPER_COLUMN), [("hangout", "3", "4 ± 1")]
     ).columns
     assert ["left", "right", "left"] == [column.justify for column in columns]
 
 
-def test_the_study_files_hold_the_sizes_of_the_paper() -> None:
+def test_the_study_files_hold_the_sizes_of_the_paper():
     for name in ("rtp-gap", "feedback"):
         file = Path(paper.__file__).with_name(f"{name}.yaml")
         assert read_document(file).data == study_content(name, *SIZES[name])
 
 
-def test_robots_are_repeated_under_names_of_their_own() -> None:
+def test_robots_are_repeated_under_names_of_their_own():
     robots = study_content("ltp-gap", 8, 2)["axes"]["robot"]["options"]
     assert [f"robot_{number}" for number in range(8)] == list(robots)
     assert robots["robot_7"]["robots.robot_7"] == robots["robot_1"]["robots.robot_1"]
     assert ["robots.robot_7"] == list(robots["robot_7"])
 
 
-def test_months_that_are_there_are_not_run_again(tmp_path: Path) -> None:
+def test_months_that_are_there_are_not_run_again(tmp_path):
     options = PaperOptions(quick=True, seeds=2, days=1, folder=tmp_path)
     first = run_months("ltp-gap", options)
     results = tmp_path / "ltp-gap" / "results"
@@ -94,7 +93,7 @@ def test_months_that_are_there_are_not_run_again(tmp_path: Path) -> None:
     assert first.variants["digest"].to_list() == again.variants["digest"].to_list()
 
 
-def test_a_month_that_fails_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_month_that_fails_is_an_error(tmp_path, monkeypatch):
     (tmp_path / "mine.py").write_text(
         "from fleet2d import Metric\n"
         "class Fails(Metric):\n"
@@ -112,7 +111,7 @@ def test_a_month_that_fails_is_an_error(tmp_path: Path, monkeypatch: pytest.Monk
         )
 
 
-def test_a_request_says_how_large_or_leaves_it() -> None:
+def test_a_request_says_how_large_or_leaves_it():
     assert (30, 30) == PaperOptions().size("feedback")
     assert (2, 3) == PaperOptions(quick=True).size("feedback")
     assert (7, 3) == PaperOptions(quick=True, seeds=7).size("feedback")
@@ -126,7 +125,7 @@ HANGOUTS = ("hangout, 10 % of moves at random", "hangout, 10 % rounds by the clo
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
+def measured(tmp_path_factory):
     """The results that are months, of two days; that of most robots of one."""
     tiny = replace(TINY, folder=tmp_path_factory.mktemp("studies"))
     two = replace(tiny, seeds=2)
@@ -140,7 +139,7 @@ def numbers_of(result: Result) -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ltp-gap", "rtp-gap", "feedback"])
-def test_a_result_is_kept_and_drawn(measured: dict[str, Result], name: str, tmp_path: Path) -> None:
+def test_a_result_is_kept_and_drawn(measured, name, tmp_path):
     content = json.loads(measured[name].save(tmp_path).read_text(encoding="utf-8"))
     assert measured[name].title == content["result"]
     draw(measured[name], tmp_path / "picture.png")
@@ -148,7 +147,7 @@ def test_a_result_is_kept_and_drawn(measured: dict[str, Result], name: str, tmp_
     assert all(table.row_count for table in measured[name].tables)
 
 
-def test_errors_under_each_policy_are_bars_as_policies_have_no_order() -> None:
+def test_errors_under_each_policy_are_bars_as_policies_have_no_order():
     means = [
         {"robot": robot, "estimator": estimator, "mean": 0.2, "low": 0.1, "high": 0.3}
         for robot in HANGOUTS
@@ -162,12 +161,12 @@ def test_errors_under_each_policy_are_bars_as_policies_have_no_order() -> None:
 
 
 @pytest.mark.slow
-def test_a_result_is_the_same_again(measured: dict[str, Result], tmp_path: Path) -> None:
+def test_a_result_is_the_same_again(measured, tmp_path):
     again = ltp_gap(replace(TINY, seeds=2, folder=tmp_path))
     assert numbers_of(measured["ltp-gap"]) == numbers_of(again)
 
 
-def test_gaps_are_of_every_room_and_day(measured: dict[str, Result]) -> None:
+def test_gaps_are_of_every_room_and_day(measured):
     numbers = measured["ltp-gap"].numbers
     assert 2 == len(numbers["gaps"])
     assert {2} == {len(line) for robot in numbers["gaps"] for line in robot.values()}
@@ -180,9 +179,7 @@ def test_gaps_are_of_every_room_and_day(measured: dict[str, Result]) -> None:
     )
 
 
-def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
-    measured: dict[str, Result],
-) -> None:
+def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(measured):
     rows = measured["rtp-gap"].numbers["means"]["simulated"]["top_1"]
     top_1 = {(row["model"], row["gap"]): row["mean"] for row in rows}
     assert top_1[NAIVE_GUESS, "0-1 min"] > 0.9
@@ -190,7 +187,7 @@ def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     assert top_1["hmm", "over 4 h"] > 0.5
 
 
-def test_differences_are_paired_by_seed(measured: dict[str, Result]) -> None:
+def test_differences_are_paired_by_seed(measured):
     errors = pl.DataFrame(measured["feedback"].numbers["tv"])
     values = {(r["robot"], r["seed"], r["estimator"]): r["value"] for r in errors.to_dicts()}
     robots = [*design_of(1).labels["robot"]]
@@ -207,7 +204,7 @@ def design_of(seeds: int) -> Design:
     return build_design(read_specification(study_content("feedback", seeds, 1)))
 
 
-def test_a_robot_goes_by_the_estimator_of_its_column_only() -> None:
+def test_a_robot_goes_by_the_estimator_of_its_column_only():
     design = design_of(1)
     for index in range(len(design)):
         labels, scenario = design.parameters(index), design.scenario(index).resolved()
@@ -220,7 +217,7 @@ def test_a_robot_goes_by_the_estimator_of_its_column_only() -> None:
         assert len(expected) == len(scenario["metrics"])
 
 
-def test_estimators_share_a_month_unless_the_robot_acts_on_them() -> None:
+def test_estimators_share_a_month_unless_the_robot_acts_on_them():
     design = design_of(3)
     others = len(design.labels["robot"]) - len(HANGOUTS)
     assert 3 * (len(HANGOUTS) * len(ESTIMATORS) + others) == len(design)
@@ -229,7 +226,7 @@ def test_estimators_share_a_month_unless_the_robot_acts_on_them() -> None:
 # --- Speed --------------------------------------------------------------------------------------
 
 
-def test_every_row_of_the_paper_is_there(shared_data: Path) -> None:
+def test_every_row_of_the_paper_is_there(shared_data):
     cases = {row["case"]: row for row in paper.rows(PaperOptions(), 30)}
     for case in (
         "base: routine, presence, hangout", "60 days", "without robot algorithms", "Flashlight",
@@ -250,15 +247,13 @@ def test_every_row_of_the_paper_is_there(shared_data: Path) -> None:
     )
 
 
-def test_a_map_that_cannot_be_read_says_so() -> None:
+def test_a_map_that_cannot_be_read_says_so():
     with pytest.raises(FloorPlanError, match="nowhere"):
         paper.rows(PaperOptions(map=Path("nowhere.yaml")), 30)
 
 
 @pytest.mark.slow
-def test_rows_are_measured_in_processes_of_their_own(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_rows_are_measured_in_processes_of_their_own(monkeypatch, tmp_path):
     day = "simulation.duration.days=1"
     cases = [
         {"case": "base", "overrides": [day], "paper": "13,000 x", "paper_speedup": 13_000},
@@ -276,7 +271,7 @@ def test_rows_are_measured_in_processes_of_their_own(
     draw(result, tmp_path / "speed.png")
 
 
-def test_watching_counts_the_time_between_frames() -> None:
+def test_watching_counts_the_time_between_frames():
     timing = paper.time_frames(60, 10, from_hour=1)
     assert 600 == timing["simulated_s"]
 
@@ -284,7 +279,7 @@ def test_watching_counts_the_time_between_frames() -> None:
 # --- Names and files ------------------------------------------------------------------------------
 
 
-def test_numbers_that_cannot_be_written_are_an_error(tmp_path: Path) -> None:
+def test_numbers_that_cannot_be_written_are_an_error(tmp_path):
     with pytest.raises(InputError, match="can't be written"):
         Result("speed", "", ()).save(tmp_path / "absent")
 
@@ -296,11 +291,7 @@ SMALLEST = ("--quick", "--seeds", "1", "--days", "2", "--workers", "1")
 
 
 @pytest.fixture
-def reproduce(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    tmp_path: Path,
-) -> Callable[..., Output]:
+def reproduce(monkeypatch, capsys, tmp_path):
     """The command in this process, in an empty folder: (exit code, stdout, stderr)."""
     monkeypatch.chdir(tmp_path)
 
@@ -314,7 +305,7 @@ def reproduce(
     return call
 
 
-def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Output]) -> None:
+def test_a_result_is_printed_kept_and_drawn(reproduce):
     code, out, _ = reproduce("ltp-gap", *SMALLEST)
     assert 0 == code
     assert "Fig. 7 left" in out
@@ -326,16 +317,14 @@ def test_a_result_is_printed_kept_and_drawn(reproduce: Callable[..., Output]) ->
 
 
 @pytest.mark.slow
-def test_units_in_brackets_are_printed(reproduce: Callable[..., Output]) -> None:
+def test_units_in_brackets_are_printed(reproduce):
     code, out, _ = reproduce("rtp-gap", *SMALLEST, "--out", "here/there")
     assert 0 == code
     assert "log loss [nats]" in out
     assert Path("here/there/rtp-gap.json").exists()
 
 
-def test_results_come_in_the_order_of_the_paper(
-    reproduce: Callable[..., Output], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_results_come_in_the_order_of_the_paper(reproduce, monkeypatch):
     measured = []
     for name in ("ltp-gap", "feedback"):
         monkeypatch.setitem(
@@ -349,7 +338,7 @@ def test_results_come_in_the_order_of_the_paper(
     assert ["ltp-gap", "feedback"] == measured
 
 
-def test_what_does_not_exist_is_refused(reproduce: Callable[..., Output]) -> None:
+def test_what_does_not_exist_is_refused(reproduce):
     code, _, err = reproduce("ltpgap")
     assert 2 == code
     assert "did you mean 'ltp-gap'?" in err
@@ -357,13 +346,13 @@ def test_what_does_not_exist_is_refused(reproduce: Callable[..., Output]) -> Non
 
 
 @pytest.mark.parametrize("option", ["--seeds", "--days", "--workers"])
-def test_sizes_below_one_are_refused(reproduce: Callable[..., Output], option: str) -> None:
+def test_sizes_below_one_are_refused(reproduce, option):
     code, _, err = reproduce("ltp-gap", option, "0")
     assert 2 == code
     assert option in err
 
 
-def test_a_directory_that_is_a_file_is_refused_first(reproduce: Callable[..., Output]) -> None:
+def test_a_directory_that_is_a_file_is_refused_first(reproduce):
     Path("file").write_text("")
     code, _, err = reproduce("ltp-gap", "--out", "file")
     assert 2 == code

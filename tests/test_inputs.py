@@ -4,7 +4,7 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ BASE = "extends: bundled:paper\nsimulation: {duration: 1 min}\n"
 
 
 @pytest.fixture
-def pipe(tmp_path: Path) -> Iterator[Path]:
+def pipe(tmp_path):
     """A pipe that nobody writes; a test that waits for it fails."""
 
     def fail(*_: object) -> None:
@@ -41,7 +41,7 @@ def pipe(tmp_path: Path) -> Iterator[Path]:
     signal.signal(signal.SIGALRM, before)
 
 
-def test_a_file_is_read(tmp_path: Path) -> None:
+def test_a_file_is_read(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"content")
 
@@ -50,7 +50,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     assert sha256_of_file(path).startswith("ed7002b439e9")
 
 
-def test_pipes_sockets_devices_and_folders_are_refused(pipe: Path, tmp_path: Path) -> None:
+def test_pipes_sockets_devices_and_folders_are_refused(pipe, tmp_path):
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(str(tmp_path / "socket"))
         for path in (pipe, tmp_path / "socket", Path("/dev/zero")):
@@ -60,18 +60,14 @@ def test_pipes_sockets_devices_and_folders_are_refused(pipe: Path, tmp_path: Pat
         open_input(tmp_path)
 
 
-def test_a_pipe_in_place_of_a_checked_file_is_refused(
-    pipe: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pipe_in_place_of_a_checked_file_is_refused(pipe, monkeypatch):
     monkeypatch.setattr("fleet2d.inputs.input_path", lambda path, _: path)
 
     with pytest.raises(InputError, match="is a device or a pipe: give a file"):
         open_input(pipe)
 
 
-def test_a_link_in_place_of_a_checked_file_is_not_followed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_link_in_place_of_a_checked_file_is_not_followed(tmp_path, monkeypatch):
     (tmp_path / "secret").write_text("1234")
     (tmp_path / "link").symlink_to("secret")
     monkeypatch.setattr("fleet2d.inputs.input_path", lambda path, _: path)
@@ -95,14 +91,14 @@ def test_a_link_in_place_of_a_checked_file_is_not_followed(
         sha256_of_file,
     ],
 )
-def test_no_reader_waits_for_a_pipe(pipe: Path, read: Callable[[Path], object]) -> None:
+def test_no_reader_waits_for_a_pipe(pipe, read):
     with pytest.raises(Fleet2DError) as caught:
         read(pipe)
     assert str(caught.value).count("\n") == 0
 
 
 @pytest.mark.parametrize("suffix", [".json", ".pgm", ".svg", ".dxf", ".ifc", ".sh3d", ".geojson"])
-def test_no_format_of_plans_waits_for_a_pipe(pipe: Path, suffix: str) -> None:
+def test_no_format_of_plans_waits_for_a_pipe(pipe, suffix):
     with pytest.raises(Fleet2DError):
         load_floorplan(pipe.rename(pipe.with_suffix(suffix)))
 
@@ -113,7 +109,7 @@ def test_no_format_of_plans_waits_for_a_pipe(pipe: Path, suffix: str) -> None:
 @pytest.mark.parametrize(
     "name", ["../secret", "/etc/passwd", "link", "a/../../secret", "absent/.."]
 )
-def test_paths_out_of_a_root_are_refused(tmp_path: Path, name: str) -> None:
+def test_paths_out_of_a_root_are_refused(tmp_path, name):
     root = tmp_path / "root"
     (root / "a").mkdir(parents=True)
     (tmp_path / "secret").write_text("1234")
@@ -129,7 +125,7 @@ def test_paths_out_of_a_root_are_refused(tmp_path: Path, name: str) -> None:
     assert resolved("/etc") == Path("/etc").resolve()
 
 
-def test_links_inside_of_a_root_and_the_package_are_read(tmp_path: Path) -> None:
+def test_links_inside_of_a_root_and_the_package_are_read(tmp_path):
     (tmp_path / "file").write_text("x")
     (tmp_path / "link").symlink_to("file")
 
@@ -139,7 +135,7 @@ def test_links_inside_of_a_root_and_the_package_are_read(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("name", ["a\0b", "\ud800"])
-def test_what_is_no_name_is_refused(name: str) -> None:
+def test_what_is_no_name_is_refused(name):
     with pytest.raises(InputError, match="can't be the name of a file") as caught:
         open_input(name)
     str(caught.value).encode()
@@ -177,7 +173,7 @@ def outside_of(opened: list[str], folder: Path) -> set[str]:
 
 
 @pytest.fixture
-def root(tmp_path: Path) -> Path:
+def root(tmp_path):
     """A folder beside one of secrets, to which links in it lead."""
     secrets, root = tmp_path / "secrets", tmp_path / "root"
     secrets.mkdir()
@@ -264,7 +260,7 @@ CASES = [
 
 
 @pytest.mark.parametrize("text", CASES)
-def test_nothing_outside_of_a_root_is_opened(root: Path, text: str) -> None:
+def test_nothing_outside_of_a_root_is_opened(root, text):
     (root / "home.yaml").write_text(text)
 
     refusal = "is outside of the folder|there is no image|is bundled|is a link|it hasn't run"
@@ -281,7 +277,7 @@ def test_nothing_outside_of_a_root_is_opened(root: Path, text: str) -> None:
     assert [] == [s for s in ("zara", "hunter2", "root:x", "1234") if s in str(caught.value)]
 
 
-def test_the_same_is_opened_without_a_root(root: Path) -> None:
+def test_the_same_is_opened_without_a_root(root):
     (root / "home.yaml").write_text("extends: [bundled:paper, extends.json]")
 
     with recorded() as opened:

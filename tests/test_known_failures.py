@@ -33,7 +33,7 @@ from fleet2d.sight.fov import VisibleRegion
 
 
 @pytest.fixture(scope="module")
-def plan_paths(shared_data: Path) -> list[Path]:
+def plan_paths(shared_data):
     paths = sorted((shared_data / "houseexpo").glob("*.json"))
     assert len(paths) == 50
     return paths
@@ -82,7 +82,7 @@ def area_by_rays(plan: FloorPlan, x: float, y: float) -> float:
 # --- 1 -----------------------------------------------------------------------------------------
 
 
-def test_known_failure_01_visibility_areas_too_small(shared_data: Path) -> None:
+def test_known_failure_01_visibility_areas_too_small(shared_data):
     """Its ray caster truncates to int: areas are 12 to 21 % too small, for nearly all poses.
 
     Here they, and the verdicts, are those of an independent exact computation, where there is one.
@@ -113,7 +113,7 @@ def test_known_failure_01_visibility_areas_too_small(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize("at", [(1.0, 1.0), (4.5, 3.4), (2.2, 1.05), (7.5, 6.5), (5.05, 3.0)])
-def test_known_failure_01_areas_and_verdicts_are_those_of_shapely(at: tuple[float, float]) -> None:
+def test_known_failure_01_areas_and_verdicts_are_those_of_shapely(at):
     """The same, beside slanted walls and in a door, against ray by ray in floating point."""
     plan = Simulation(scenario()).home.plan
     x, y = plan.lattice.to_metres(plan.lattice.to_lattice(at)).tolist()
@@ -133,7 +133,7 @@ def test_known_failure_01_areas_and_verdicts_are_those_of_shapely(at: tuple[floa
 
 
 @pytest.mark.parametrize("place", [(1.0, 1.0), (4.5, 3.4), (5.05, 3.0), (3.5, 4.05)])
-def test_known_failure_02_no_direction_falls_into_a_gap(place: tuple[float, float]) -> None:
+def test_known_failure_02_no_direction_falls_into_a_gap(place):
     """A bearing in an angular gap between two polygon pieces raises there, on day 8.75 of its example.
 
     Here every direction that a step can tell belongs to a piece: close by, all is visible.
@@ -148,7 +148,7 @@ def test_known_failure_02_no_direction_falls_into_a_gap(place: tuple[float, floa
 
 
 @pytest.mark.slow
-def test_known_failure_02_ten_days_run_to_their_end() -> None:
+def test_known_failure_02_ten_days_run_to_their_end():
     """The shipped 30-day example dies on day 8.75."""
     stored = fleet2d.run(
         "bundled:paper", "simulation.duration.days=10", users={"ben": {"type": "meander"}}
@@ -157,7 +157,7 @@ def test_known_failure_02_ten_days_run_to_their_end() -> None:
 
 
 @pytest.mark.slow
-def test_known_failure_02_years_run_to_their_end() -> None:
+def test_known_failure_02_years_run_to_their_end():
     """A minute at a time, and a robot that moves a dozen times a day."""
     days, last = (3652, "2036-01-04T23") if THOROUGH else (731, "2028-01-05T23")
     calm = "robots.astro.behaviors.0.dwell=2 h"
@@ -172,7 +172,7 @@ def test_known_failure_02_years_run_to_their_end() -> None:
 # --- 3 -----------------------------------------------------------------------------------------
 
 
-def test_known_failure_03_nobody_is_seen_through_the_middle_of_a_wall() -> None:
+def test_known_failure_03_nobody_is_seen_through_the_middle_of_a_wall():
     """There, 6.5 % of the people behind a wall within 3 m are seen through it."""
     camera = {"range": [0, 10], "angle_deg": 360}
     for x in np.arange(1.0, 2.9, 0.3).tolist():
@@ -185,7 +185,7 @@ def test_known_failure_03_nobody_is_seen_through_the_middle_of_a_wall() -> None:
         assert {"near"} == seen, x
 
 
-def test_known_failure_03_every_observation_has_a_clear_line() -> None:
+def test_known_failure_03_every_observation_has_a_clear_line():
     """The same in a run: between the robot and whom it sees there is no wall, and it sees all others."""
     content = scenario(
         "1 h",
@@ -212,7 +212,7 @@ def test_known_failure_03_every_observation_has_a_clear_line() -> None:
 # --- 4 -----------------------------------------------------------------------------------------
 
 
-def test_known_failure_04_what_is_seen_and_the_plan_can_be_stored_and_read_again() -> None:
+def test_known_failure_04_what_is_seen_and_the_plan_can_be_stored_and_read_again():
     """Its visibility polygons can't be pickled, and the stored cache is never read."""
     plan = Simulation(scenario()).home.plan
     region = VisibleRegion(plan, 1.0, 1.0)
@@ -227,7 +227,7 @@ def test_known_failure_04_what_is_seen_and_the_plan_can_be_stored_and_read_again
 # --- 5 -----------------------------------------------------------------------------------------
 
 
-def test_known_failure_05_a_run_that_is_stored_is_there(tmp_path: Path) -> None:
+def test_known_failure_05_a_run_that_is_stored_is_there(tmp_path):
     """`save: true` writes nothing there."""
     fleet2d.run(everything("5 min"), out=tmp_path / "run")
     stored = fleet2d.open_run(tmp_path / "run")
@@ -378,13 +378,13 @@ CASES = [
 
 
 @pytest.mark.parametrize("cls", [cls for cls, _ in CHANGES], ids=lambda cls: cls.__name__)
-def test_known_failure_05_every_key_is_tried(cls: type) -> None:
+def test_known_failure_05_every_key_is_tried(cls):
     """A key that is added without a line in the table of this test fails here."""
     tried = {key for c, _, key, _ in CASES if c is cls} | {key for c, key in ELSEWHERE if c is cls}
     assert set(cls.model_fields) == tried  # type: ignore[attr-defined]
 
 
-def test_known_failure_05_what_is_tried_elsewhere_is_tried_there() -> None:
+def test_known_failure_05_what_is_tried_elsewhere_is_tried_there():
     places = {place.partition(":")[0] for place in ELSEWHERE.values()}
     assert [] == [
         place
@@ -394,7 +394,7 @@ def test_known_failure_05_what_is_tried_elsewhere_is_tried_there() -> None:
 
 
 @pytest.fixture(scope="module")
-def usual() -> Any:
+def usual():
     """What comes of the scenario as it is."""
     found = effects(life())
     assert isinstance(found, tuple)
@@ -407,9 +407,7 @@ def usual() -> Any:
     CASES,
     ids=[f"{cls.__name__}.{key}" for cls, _, key, _ in CASES],
 )
-def test_known_failure_05_every_key_has_an_effect(
-    usual: Any, cls: type, where: str, key: str, value: Any
-) -> None:
+def test_known_failure_05_every_key_has_an_effect(usual, cls, where, key, value):
     """`fov_provider`, `min_distance` and `max_distance` are accepted and ignored there."""
     content = copy.deepcopy(life())
     section: Any = content
@@ -428,7 +426,7 @@ def test_known_failure_05_every_key_has_an_effect(
         fleet2d.load_scenario(content)
 
 
-def test_known_failure_05_detection_and_ranges_change_what_they_say() -> None:
+def test_known_failure_05_detection_and_ranges_change_what_they_say():
     """Not any effect, but the right one."""
     stored = {
         name: run(life(), *overrides)
@@ -452,7 +450,7 @@ def test_known_failure_05_detection_and_ranges_change_what_they_say() -> None:
 
 
 @pytest.mark.slow
-def test_known_failure_05_a_color_is_drawn(tmp_path: Path) -> None:
+def test_known_failure_05_a_color_is_drawn(tmp_path):
     """The one key that only pictures show."""
     drawn = []
     for number, color in enumerate(("#d62728", "#2ca02c")):
@@ -472,9 +470,7 @@ def test_known_failure_05_a_color_is_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_known_failure_06_rooms_cover_the_space_are_disjoint_and_never_empty(
-    plan_paths: list[Path],
-) -> None:
+def test_known_failure_06_rooms_cover_the_space_are_disjoint_and_never_empty(plan_paths):
     """A box that misses the floor gets the background there; a kitchen with the box of another, nothing."""
     for file in some(plan_paths, 5):
         plan = fleet2d.load_floorplan(file)
@@ -492,12 +488,12 @@ def houseexpo(folder: Path, **content: Any) -> FloorPlan:
     return fleet2d.load_floorplan(file)
 
 
-def test_known_failure_06_a_plan_without_labels_is_one_room(tmp_path: Path) -> None:
+def test_known_failure_06_a_plan_without_labels_is_one_room(tmp_path):
     """It crashes there."""
     assert ["unknown_1"] == [room.name for room in houseexpo(tmp_path).rooms]
 
 
-def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path: Path) -> None:
+def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path):
     """The kitchen gets 0 cells there."""
     box = [[0, 0, 3, 4]]
     plan = houseexpo(
@@ -515,9 +511,7 @@ def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path: Path) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("cell", some([0.02, 0.01, 0.05, 0.1, 0.2, 0.5, 1.0], 2))
-def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
-    plan_paths: list[Path], cell: float
-) -> None:
+def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(plan_paths, cell):
     """At 0.2 m, outlines cross and up to 22 % of the area are lost there, without a word."""
     read = 0
     refused: dict[str, str] = {}
@@ -544,7 +538,7 @@ def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(
 
 @pytest.mark.parametrize("step", ["100 ms", "1 s", "10 s", "7 min", "1 h"])
 @pytest.mark.parametrize("speed", [0.05, 1, 20])
-def test_known_failure_08_no_move_crosses_a_wall(speed: float, step: str) -> None:
+def test_known_failure_08_no_move_crosses_a_wall(speed, step):
     """Only the end of a move is checked there: at 1 m per step, 16 to 22 % of the moves cross a wall."""
     seconds = {"100 ms": 0.1, "1 s": 1, "10 s": 10, "7 min": 420, "1 h": 3600}[step]
     content = scenario(
@@ -569,7 +563,7 @@ def test_known_failure_08_no_move_crosses_a_wall(speed: float, step: str) -> Non
 
 
 @pytest.mark.parametrize("step", ["1 s", "40 s"])
-def test_known_failure_08_walks_go_round_walls_at_any_speed_and_step(step: str) -> None:
+def test_known_failure_08_walks_go_round_walls_at_any_speed_and_step(step):
     """Between two steps a walk may go round a corner: the metres that it takes tell whether it did."""
     content = scenario(
         "1 h", robots={"astro": {"type": "patrol", "speed": 3, "dwell": 0, "look_around": False}},
@@ -593,7 +587,7 @@ def test_known_failure_08_walks_go_round_walls_at_any_speed_and_step(step: str) 
 # --- 9 -----------------------------------------------------------------------------------------
 
 
-def test_known_failure_09_adding_a_user_leaves_the_robot_as_it_was() -> None:
+def test_known_failure_09_adding_a_user_leaves_the_robot_as_it_was():
     """It changes the robot's random numbers there."""
     one = scenario("1 h", users={"ana": "meander"}, robots={"astro": "meander"})
     two = scenario("1 h", users={"zoe": "meander", "ana": "meander"}, robots={"astro": "meander"})
@@ -603,7 +597,7 @@ def test_known_failure_09_adding_a_user_leaves_the_robot_as_it_was() -> None:
         assert before.heading.tolist() == after.heading.tolist()
 
 
-def test_known_failure_09_a_run_without_a_seed_can_be_repeated(tmp_path: Path) -> None:
+def test_known_failure_09_a_run_without_a_seed_can_be_repeated(tmp_path):
     """It can't there."""
     content = scenario(users={"ana": "meander"})
     del content["simulation"]["seed"]
@@ -634,7 +628,7 @@ class Keep(Metric):
 
 
 @pytest.mark.parametrize("span", [None, 1])
-def test_known_failure_10_observations_are_values(span: int | None) -> None:
+def test_known_failure_10_observations_are_values(span):
     """An observation is a reference to the user's pose there, and moves with the user."""
     content = scenario(
         "20 min", users={"ana": "meander"}, robots={"astro": {"camera": {"angle_deg": 360}}},
@@ -651,8 +645,8 @@ def test_known_failure_10_observations_are_values(span: int | None) -> None:
 @pytest.mark.parametrize("bucket", ["users", "robots"])
 @pytest.mark.parametrize("start", [[5.05, 1.0], [2.4, 1.5], [-1, 0], [0.05, 1.0], [0, 0]])
 def test_known_failure_11_a_start_in_a_wall_is_an_error_that_says_where_free_space_is(
-    bucket: str, start: list[float]
-) -> None:
+    bucket, start
+):
     """It is accepted there, and the entity never moves."""
     with pytest.raises(InputError) as caught:
         Simulation(scenario(**{bucket: {"ana": {"type": "meander", "start": start}}}))
@@ -666,7 +660,7 @@ def test_known_failure_11_a_start_in_a_wall_is_an_error_that_says_where_free_spa
 # --- 12 ----------------------------------------------------------------------------------------
 
 
-def test_known_failure_12_the_speedup_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_known_failure_12_the_speedup_is_held(monkeypatch):
     """`speedup: 1000` reaches 146 there: it sleeps a full step on top of computing."""
     wall = Wall(look_s=0.005)  # what computing costs, each time that the pace looks at the clock
     monkeypatch.setattr("fleet2d.engine.loop.time", wall)
@@ -677,7 +671,7 @@ def test_known_failure_12_the_speedup_is_held(monkeypatch: pytest.MonkeyPatch) -
 # --- 13 ----------------------------------------------------------------------------------------
 
 
-def test_known_failure_13_sight_is_judged_from_the_pose_not_from_its_cell() -> None:
+def test_known_failure_13_sight_is_judged_from_the_pose_not_from_its_cell():
     """From the cell's corner, 0.15 % of the answers change.
 
     At the door between living room and kitchen, less than a cell decides what is seen.
@@ -715,9 +709,7 @@ def test_known_failure_13_sight_is_judged_from_the_pose_not_from_its_cell() -> N
 @pytest.mark.parametrize(
     ("duration", "step", "steps"), [("10 s", "3 s", 3), ("1 h", "7 min", 8), ("5 s", "5 s", 1)]
 )
-def test_known_failure_14_a_run_stops_at_its_last_full_step(
-    duration: str, step: str, steps: int
-) -> None:
+def test_known_failure_14_a_run_stops_at_its_last_full_step(duration, step, steps):
     """A duration that is no multiple of the step runs longer than asked there."""
     content = scenario(duration, users={"ana": "meander"}, simulation={"step": step})
     content["artifacts"] = {"trajectories": step}
@@ -734,7 +726,7 @@ def test_known_failure_14_a_run_stops_at_its_last_full_step(
     )
 
 
-def test_known_failure_14_a_duration_shorter_than_a_step_is_an_error() -> None:
+def test_known_failure_14_a_duration_shorter_than_a_step_is_an_error():
     """There would be nothing to simulate."""
     with pytest.raises(InputError, match="shorter than one step"):
         Simulation(scenario("2 s", simulation={"step": "3 s"}))
@@ -744,7 +736,7 @@ def test_known_failure_14_a_duration_shorter_than_a_step_is_an_error() -> None:
 
 
 @pytest.mark.parametrize("radius", [0.12, 0.15, 0.2, 0.25, 0.333])
-def test_known_failure_15_clearance_is_the_same_on_all_sides(tmp_path: Path, radius: float) -> None:
+def test_known_failure_15_clearance_is_the_same_on_all_sides(tmp_path, radius):
     """Erosion with even kernels gives another clearance on each side there."""
     box = [[0, 0], [4, 0], [4, 4], [0, 4]]
     file = tmp_path / "box.json"
@@ -761,7 +753,7 @@ def test_known_failure_15_clearance_is_the_same_on_all_sides(tmp_path: Path, rad
     assert radius <= left / plan.lattice.units_per_m <= radius + 6 / plan.lattice.units_per_m
 
 
-def test_known_failure_15_a_mirrored_home_has_mirrored_space() -> None:
+def test_known_failure_15_a_mirrored_home_has_mirrored_space():
     """The same for every wall of a home."""
     document = flat_document()
     mirrored = copy.deepcopy(document)

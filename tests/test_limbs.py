@@ -45,7 +45,7 @@ OF_THE_HEART = (
 
 
 @pytest.fixture(scope="module")
-def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def copy(tmp_path_factory):
     """A folder with a copy of Fleet2D and its core, which the first process compiles for all."""
     folder = tmp_path_factory.mktemp("limbs")
     skipped = shutil.ignore_patterns("__pycache__", "page")
@@ -90,7 +90,7 @@ def commands_of(limb: str) -> set[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("missing", [*([limb] for limb in LIMBS if THOROUGH), LIMBS], ids=" ".join)
-def test_heart_works_without_limbs(missing: list[str], copy: Path) -> None:
+def test_heart_works_without_limbs(missing, copy):
     shutil.rmtree(copy / "run", ignore_errors=True)
     with without(copy, missing):
         calls = [
@@ -107,7 +107,7 @@ def test_heart_works_without_limbs(missing: list[str], copy: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("missing", [*([limb] for limb in LIMBS if THOROUGH), LIMBS], ids=" ".join)
-def test_tests_of_the_heart_pass_without_limbs(missing: list[str], copy: Path) -> None:
+def test_tests_of_the_heart_pass_without_limbs(missing, copy):
     files = [str(ROOT / "tests" / name) for name in OF_THE_HEART]
     options = ["-q", "-p", "no:fleet2d", "-p", "no:cacheprovider", "--rootdir", str(ROOT)]
     with without(copy, missing):
@@ -117,7 +117,7 @@ def test_tests_of_the_heart_pass_without_limbs(missing: list[str], copy: Path) -
 
 
 @pytest.mark.slow
-def test_command_of_a_missing_limb_is_unknown(copy: Path) -> None:
+def test_command_of_a_missing_limb_is_unknown(copy):
     with without(copy, ["learning"]):
         done = process(copy, "-m", "fleet2d", "fit")
 
@@ -126,7 +126,7 @@ def test_command_of_a_missing_limb_is_unknown(copy: Path) -> None:
 
 
 @pytest.mark.slow
-def test_command_that_needs_a_missing_limb_names_it(copy: Path) -> None:
+def test_command_that_needs_a_missing_limb_names_it(copy):
     with without(copy, ["studies"]):
         done = process(copy, "-m", "fleet2d", "test", "bundled:family", "--homes", "2")
 
@@ -146,9 +146,7 @@ def greet(name: str) -> None:
         ("tests.test_limbs:nothing", "the command 'greet' (tests.test_limbs:nothing) fails"),
     ],
 )
-def test_command_of_another_package_runs_or_says_what_is_wrong(
-    value: str, output: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_command_of_another_package_runs_or_says_what_is_wrong(value, output, monkeypatch):
     entry = EntryPoint("greet", value, plugins.GROUP)
     monkeypatch.setattr(plugins, "entries", lambda group=plugins.GROUP: iter([entry]))
 

@@ -62,19 +62,19 @@ def words() -> list[str]:
 
 @pytest.mark.parametrize("vision", VISION)
 @pytest.mark.parametrize("palette", ["users", "words"])
-def test_colours_are_distinct_with_any_colour_vision(palette: str, vision: str) -> None:
+def test_colours_are_distinct_with_any_colour_vision(palette, vision):
     colors = list(USER_COLORS) if palette == "users" else words()
     assert nearest(colors, vision) > 10
 
 
 @pytest.mark.parametrize("vision", VISION)
-def test_rooms_of_one_type_differ_in_shade(vision: str) -> None:
+def test_rooms_of_one_type_differ_in_shade(vision):
     for kind in ("bedroom", "bathroom", "child_room", "office"):
         for color in (room_color, deep_color):
             assert nearest([color(kind, i) for i in range(len(SHADES))], vision) > 3
 
 
-def test_names_are_legible_on_every_room() -> None:
+def test_names_are_legible_on_every_room():
     for kind in ROOM_COLORS:
         for number in range(len(SHADES)):
             assert contrast(TEXT_COLOR, room_color(kind, number)) > 4.5, kind

@@ -12,12 +12,12 @@ ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("name", fleet2d.__all__)
-def test_every_public_name_can_be_imported(name: str) -> None:
+def test_every_public_name_can_be_imported(name):
     assert getattr(fleet2d, name) is not None
     assert name in dir(fleet2d)
 
 
-def test_stub_has_the_public_names_with_their_modules() -> None:
+def test_stub_has_the_public_names_with_their_modules():
     stub = Path(fleet2d.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     imports = re.findall(r"^from (\S+) import (\w+) as \2$", stub, re.MULTILINE)
 
@@ -26,12 +26,12 @@ def test_stub_has_the_public_names_with_their_modules() -> None:
         assert getattr(import_module(module), name) is getattr(fleet2d, name)
 
 
-def test_unknown_name_is_an_attribute_error() -> None:
+def test_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'Roomba'"):
         fleet2d.Roomba  # type: ignore[attr-defined]  # noqa: B018
 
 
-def test_documented_modules_are_named_as_public() -> None:
+def test_documented_modules_are_named_as_public():
     """What the documentation imports is public, and the page of the interface lists it."""
     page = (ROOT / "docs/reference/api.md").read_text(encoding="utf-8")
     documented = set()

@@ -4,7 +4,6 @@ import itertools
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 
@@ -31,7 +30,7 @@ CELLS = [
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def folder(tmp_path_factory):
     """Return a folder with the files of the page, and the logs that its commands write."""
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
     folder = tmp_path_factory.mktemp("parts")
@@ -47,14 +46,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
-def test_the_table_has_all_parts_in_all_columns() -> None:
+def test_the_table_has_all_parts_in_all_columns():
     assert len(ROWS) == 6
     assert [sum(bool(cell) for cell in row) for row in ROWS] == [2, 3, 3, 3, 3, 3]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("cell", some(CELLS, 2))
-def test_a_cell_runs(folder: Path, cell: str) -> None:
+def test_a_cell_runs(folder, cell):
     run = fleet2d.run("parts.yaml", cell)
 
     assert run.status == "complete"
@@ -62,7 +61,7 @@ def test_a_cell_runs(folder: Path, cell: str) -> None:
 
 
 @pytest.mark.slow
-def test_what_was_replayed_is_as_it_was(folder: Path) -> None:
+def test_what_was_replayed_is_as_it_was(folder):
     logged = [row[1][0] for row in ROWS[1:]]
     first = fleet2d.open_run("first")
 
@@ -81,7 +80,7 @@ def test_what_was_replayed_is_as_it_was(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_live_cells_hear_a_log_that_is_played_to_them(folder: Path) -> None:
+def test_live_cells_hear_a_log_that_is_played_to_them(folder):
     """A program without Fleet2D plays the log, twenty times as fast as it was."""
     cells = [row[2][0].replace(":9000", ":0") for row in ROWS[1:5]]
     scenario = fleet2d.load_scenario("parts.yaml", *cells, "simulation.duration=1 min")
@@ -113,7 +112,7 @@ def test_live_cells_hear_a_log_that_is_played_to_them(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_parts_are_combined(folder: Path) -> None:
+def test_parts_are_combined(folder):
     choices = [[cell[0] for cell in row if cell] for row in ROWS[1:]]
     combinations = list(itertools.product(*choices))
     for cells in combinations if thorough.THOROUGH else combinations[:: len(combinations) // 4]:
@@ -121,9 +120,7 @@ def test_parts_are_combined(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(
-    shared_data: Path, tmp_path: Path
-) -> None:
+def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(shared_data, tmp_path):
     """One learner, a real log and its twin: both are runs of one scenario, shown on one page."""
     from starlette.testclient import TestClient
 

@@ -22,7 +22,7 @@ def text(name: str) -> str:
     return (ROOT / name).read_text(encoding="utf-8")
 
 
-def test_citation_names_the_paper_and_no_version_that_nobody_can_get() -> None:
+def test_citation_names_the_paper_and_no_version_that_nobody_can_get():
     citation = yaml.safe_load(text("CITATION.cff"))
     assert {"cff-version", "message", "title", "authors", "license"} <= set(citation)
     paper = citation["preferred-citation"]
@@ -32,7 +32,7 @@ def test_citation_names_the_paper_and_no_version_that_nobody_can_get() -> None:
 
 
 @pytest.mark.parametrize("form", [pytest.param(form, id=form.stem) for form in FORMS])
-def test_issue_form_has_what_forms_need(form: Path) -> None:
+def test_issue_form_has_what_forms_need(form):
     content = yaml.safe_load(form.read_text(encoding="utf-8"))
     assert {"name", "description", "body"} <= set(content)
     fields = [part for part in content["body"] if part["type"] != "markdown"]
@@ -43,7 +43,7 @@ def test_issue_form_has_what_forms_need(form: Path) -> None:
     assert any(part.get("validations", {}).get("required") for part in fields)
 
 
-def test_container_and_development_container_install_extras_that_there_are() -> None:
+def test_container_and_development_container_install_extras_that_there_are():
     content: dict[str, Any] = json.loads(text(".devcontainer/devcontainer.json"))
     for command in (content["postCreateCommand"], text("Dockerfile")):
         extras = re.findall(r"\[([a-z,]+)\]", command)
@@ -51,22 +51,22 @@ def test_container_and_development_container_install_extras_that_there_are() -> 
         assert set(extras[0].split(",")) <= set(EXTRAS), command
 
 
-def test_container_has_a_python_that_the_package_supports() -> None:
+def test_container_has_a_python_that_the_package_supports():
     versions = re.findall(r"python:3\.(\d+)-", text("Dockerfile"))
     assert len(set(versions)) == 1
     assert int(versions[0]) >= 11
 
 
-def test_security_policy_leads_to_the_threat_model() -> None:
+def test_security_policy_leads_to_the_threat_model():
     assert "(docs/explanation/security.md)" in text("SECURITY.md")
 
 
-def test_changelog_has_the_version_of_the_package_in_at_most_forty_lines() -> None:
+def test_changelog_has_the_version_of_the_package_in_at_most_forty_lines():
     assert f"## {fleet2d.__version__}" in text("CHANGELOG.md")
     assert 40 >= len(text("CHANGELOG.md").splitlines())
 
 
-def test_source_distribution_takes_nothing_from_an_environment_in_the_clone() -> None:
+def test_source_distribution_takes_nothing_from_an_environment_in_the_clone():
     build = tomllib.loads(text("pyproject.toml"))["tool"]["scikit-build"]["sdist"]
     assert [] == [pattern for pattern in build["include"] if not pattern.startswith("/")]
     assert all((ROOT / pattern[1:]).exists() for pattern in build["include"])

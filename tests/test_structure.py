@@ -23,13 +23,13 @@ SELDOM = (
 
 
 @pytest.mark.slow
-def test_modules_form_no_circle_longer_than_two() -> None:
+def test_modules_form_no_circle_longer_than_two():
     graph = {name: set(imports(name, path)) for name, path in MODULES.items()}
 
     assert [] == [sorted(circle) for circle in circles(graph) if len(circle) > LONGEST_CIRCLE]
 
 
-def test_a_run_imports_what_its_scenario_names_alone() -> None:
+def test_a_run_imports_what_its_scenario_names_alone():
     code = (
         "import sys, fleet2d\n"
         "fleet2d.run('bundled:paper', 'simulation.duration=1 min', seed=4)\n"
@@ -43,7 +43,7 @@ def test_a_run_imports_what_its_scenario_names_alone() -> None:
     assert [] == [name for name in SELDOM if f"fleet2d.{name}" in loaded]
 
 
-def test_circles_are_found() -> None:
+def test_circles_are_found():
     graph = {"a": {"b"}, "b": {"a", "c"}, "c": {"a", "d"}, "d": {"e"}, "e": {"d"}, "f": {"a"}}
 
     assert [{"a", "b", "c"}, {"d", "e"}, {"f"}] == sorted(circles(graph), key=min)
@@ -102,7 +102,7 @@ def base_of(node: ast.ImportFrom, name: str, path: Path) -> str:
     )
 
 
-def test_map_of_packages_is_that_of_the_contract() -> None:
+def test_map_of_packages_is_that_of_the_contract():
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     drawn = page.split(package_map.BEGIN)[1].split(package_map.END)[0]
 
@@ -114,7 +114,7 @@ def names_in(picture: str) -> list[str]:
     return [line.split()[0] for line in picture.splitlines()]
 
 
-def test_files_that_contributing_names_are_there() -> None:
+def test_files_that_contributing_names_are_there():
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     page = page[
         page.index("## How a step is computed") : page.index("## Add a function to the core")
@@ -131,7 +131,7 @@ def test_files_that_contributing_names_are_there() -> None:
 
 
 @pytest.mark.slow
-def test_no_two_classes_have_the_same_name() -> None:
+def test_no_two_classes_have_the_same_name():
     places: dict[str, list[str]] = {}
     for module, path in MODULES.items():
         for node in definitions(path):

@@ -33,7 +33,7 @@ def locked_versions() -> dict[str, list[str]]:
     return versions
 
 
-def test_the_lock_has_every_dependency_in_a_version_that_it_allows() -> None:
+def test_the_lock_has_every_dependency_in_a_version_that_it_allows():
     requirements = [Requirement(text) for text in PROJECT["dependencies"]]
     requirements += [requirement for extra in LOCKED_EXTRAS for requirement in needed(extra)]
 
@@ -45,7 +45,7 @@ def test_the_lock_has_every_dependency_in_a_version_that_it_allows() -> None:
         assert all(requirement.specifier.contains(version) for version in locked), requirement
 
 
-def test_every_package_of_the_lock_has_hashes() -> None:
+def test_every_package_of_the_lock_has_hashes():
     text = (ROOT / "requirements.lock").read_text("utf-8")
     entries = re.split(r"^(?=[a-z0-9])", text, flags=re.M)[1:]
 
@@ -53,7 +53,7 @@ def test_every_package_of_the_lock_has_hashes() -> None:
     assert all(re.search(r"--hash=sha256:[0-9a-f]{64}", entry) for entry in entries)
 
 
-def test_the_docs_have_the_licences_of_all_installed_dependencies() -> None:
+def test_the_docs_have_the_licences_of_all_installed_dependencies():
     _, rest = licenses.PAGE.read_text(encoding="utf-8").split(licenses.BEGIN)
     rows = re.findall(r"^\| (\S[^|]*) \| ([^|]*) \|$", rest.split(licenses.END)[0], re.M)[2:]
     listed = {name: license_ for license_, names in rows for name in names.split(", ")}
@@ -74,7 +74,7 @@ def test_the_docs_have_the_licences_of_all_installed_dependencies() -> None:
 @pytest.mark.parametrize(
     "path", sorted((ROOT / ".github/workflows").glob("*.y*ml")), ids=lambda p: p.name
 )
-def test_actions_are_named_by_their_commits(path: Path) -> None:
+def test_actions_are_named_by_their_commits(path):
     """A tag can be moved to other code; a commit can't."""
     actions = re.findall(r"uses: (\S+)", path.read_text(encoding="utf-8"))
 

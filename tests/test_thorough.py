@@ -17,6 +17,6 @@ def drawn() -> list[int]:
     return values
 
 
-def test_examples_are_new_only_if_it_is_thorough() -> None:
+def test_examples_are_new_only_if_it_is_thorough():
     """The tests failed once in a fresh clone, at an example that nobody had drawn before."""
     assert THOROUGH == (drawn() != drawn())

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 import yaml
-from tests.scenes import OWN, Cli, flat_path, fleet2d_process, scenario, write_flat
+from tests.scenes import OWN, flat_path, fleet2d_process, scenario, write_flat
 
 from fleet2d.artifacts import arrow, store
 from fleet2d.runs.run import open_run
 
 
 @pytest.fixture
-def fleet2d(fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Cli:
+def fleet2d(fleet2d, monkeypatch, tmp_path):
     """The command line in an empty folder within another one."""
     folder = tmp_path / "here"
     folder.mkdir()
@@ -154,14 +154,14 @@ WRONG: dict[str, tuple[dict[str, Any] | str, list[str]]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_scenario_is_refused(fleet2d: Cli, case: str) -> None:
+def test_a_wrong_scenario_is_refused(fleet2d, case):
     content, words = WRONG[case]
     scenario_file = written(content)
     for command in (["validate", scenario_file], ["run", scenario_file, "--out", "out/run"]):
         check(fleet2d(*command), 2, ["error:", *words], {"home.yaml"})
 
 
-def test_a_missing_scenario_is_refused(fleet2d: Cli) -> None:
+def test_a_missing_scenario_is_refused(fleet2d):
     written(small())
     check(
         fleet2d("run", "hom.yaml"),
@@ -171,7 +171,7 @@ def test_a_missing_scenario_is_refused(fleet2d: Cli) -> None:
     )
 
 
-def test_a_folder_for_a_scenario_is_refused(fleet2d: Cli) -> None:
+def test_a_folder_for_a_scenario_is_refused(fleet2d):
     Path("home").mkdir()
     check(fleet2d("run", "home"), 2, ["error:", "home", "folder"], {"home"})
 
@@ -193,7 +193,7 @@ PLANS: dict[str, tuple[str, list[str]]] = {
 
 
 @pytest.mark.parametrize("case", PLANS)
-def test_a_file_that_is_no_home_is_refused(fleet2d: Cli, case: str) -> None:
+def test_a_file_that_is_no_home_is_refused(fleet2d, case):
     text, words = PLANS[case]
     Path("plan.json").write_text(text)
     left = {"plan.json"}
@@ -204,22 +204,22 @@ def test_a_file_that_is_no_home_is_refused(fleet2d: Cli, case: str) -> None:
 @pytest.mark.parametrize(
     "case", [name for name in PLANS if name not in ("our own format", "not HouseExpo")]
 )
-def test_what_is_no_home_is_not_drawn(fleet2d: Cli, case: str) -> None:
+def test_what_is_no_home_is_not_drawn(fleet2d, case):
     text, words = PLANS[case]
     Path("plan.json").write_text(text)
     check(fleet2d("show", "plan.json", "--out", "plan.png"), 2, ["error:", *words], {"plan.json"})
 
 
-def test_what_is_not_there_is_not_drawn(fleet2d: Cli) -> None:
+def test_what_is_not_there_is_not_drawn(fleet2d):
     check(fleet2d("show", "nothing.json"), 2, ["error:", "nothing.json"], set())
     check(fleet2d("show", "famly_home"), 2, ["error:", "did you mean 'family_home'"], set())
 
 
-def test_a_picture_of_an_unknown_kind_is_refused(fleet2d: Cli) -> None:
+def test_a_picture_of_an_unknown_kind_is_refused(fleet2d):
     check(fleet2d("show", flat_path(), "--out", "plan.doc"), 2, ["error:", ".png", ".svg"], set())
 
 
-def test_a_picture_where_nobody_may_write_is_refused(fleet2d: Cli) -> None:
+def test_a_picture_where_nobody_may_write_is_refused(fleet2d):
     Path("file").write_text("")
     result = fleet2d("show", flat_path(), "--out", "file/plan.png")
     check(result, 2, ["error:", "file/plan.png"], {"file"})
@@ -228,7 +228,7 @@ def test_a_picture_where_nobody_may_write_is_refused(fleet2d: Cli) -> None:
 # --- Where to store ----------------------------------------------------------------------------
 
 
-def test_a_run_directory_that_exists_is_left_alone(fleet2d: Cli) -> None:
+def test_a_run_directory_that_exists_is_left_alone(fleet2d):
     scenario_file = written(small())
     assert 0 == fleet2d("run", scenario_file, "--out", "run", "--quiet")[0]
     before = {path: path.stat().st_mtime_ns for path in Path("run").iterdir()}
@@ -242,14 +242,14 @@ def test_a_run_directory_that_exists_is_left_alone(fleet2d: Cli) -> None:
     assert before == {path: path.stat().st_mtime_ns for path in Path("run").iterdir()}
 
 
-def test_a_path_below_a_file_is_refused(fleet2d: Cli) -> None:
+def test_a_path_below_a_file_is_refused(fleet2d):
     scenario_file = written(small())
     result = fleet2d("run", scenario_file, "--out", "home.yaml/deep/run")
     check(result, 2, ["error:", "home.yaml", "not a directory", "--out"], {"home.yaml"})
 
 
 @pytest.mark.skipif(os.name != "posix" or os.getuid() == 0, reason="root may write anywhere")
-def test_a_directory_that_can_not_be_written_is_refused(fleet2d: Cli) -> None:
+def test_a_directory_that_can_not_be_written_is_refused(fleet2d):
     scenario_file = written(small())
     Path("locked").mkdir(mode=0o555)
     result = fleet2d("run", scenario_file, "--out", "locked/run")
@@ -259,7 +259,7 @@ def test_a_directory_that_can_not_be_written_is_refused(fleet2d: Cli) -> None:
 @pytest.mark.skipif(
     not os.access("/proc", os.R_OK), reason="no /proc, where nobody can make a folder"
 )
-def test_a_directory_that_nobody_can_make_is_refused(fleet2d: Cli) -> None:
+def test_a_directory_that_nobody_can_make_is_refused(fleet2d):
     scenario_file = written(small())
     result = fleet2d("run", scenario_file, "--out", "/proc/fleet2d/run")
     check(result, 2, ["error:", "/proc/fleet2d", "--out"], {"home.yaml"})
@@ -269,9 +269,7 @@ def no_space(*args: object, **kwargs: object) -> None:
     raise OSError(28, "No space left on device")
 
 
-def test_a_disk_that_is_full_fails_with_exit_1(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_is_full_fails_with_exit_1(fleet2d, monkeypatch):
     scenario_file = written(small())
     monkeypatch.setattr(arrow.ParquetTable, "write", no_space)
     code, out, err = fleet2d("run", scenario_file, "--out", "run")
@@ -283,9 +281,7 @@ def test_a_disk_that_is_full_fails_with_exit_1(
     assert [] == list(Path("run").glob("*.parquet"))
 
 
-def test_a_disk_full_from_the_start_fails_with_exit_1_and_leaves_nothing(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_full_from_the_start_fails_with_exit_1_and_leaves_nothing(fleet2d, monkeypatch):
     scenario_file = written(small())
     write = store.write_atomically
 
@@ -300,7 +296,7 @@ def test_a_disk_full_from_the_start_fails_with_exit_1_and_leaves_nothing(
 
 
 @pytest.fixture
-def tiny_disk(tmp_path: Path) -> Any:
+def tiny_disk(tmp_path):
     """A disk of 64 kB."""
     disk = tmp_path / "disk"
     disk.mkdir()
@@ -315,7 +311,7 @@ def tiny_disk(tmp_path: Path) -> Any:
     subprocess.run(["umount", str(disk)], check=True)
 
 
-def test_a_real_disk_that_is_full_fails_with_exit_1(fleet2d: Cli, tiny_disk: Path) -> None:
+def test_a_real_disk_that_is_full_fails_with_exit_1(fleet2d, tiny_disk):
     scenario_file = written(small(artifacts={"trajectories": "every step"}))
     code, _, err = fleet2d(
         "run", scenario_file, "simulation.duration=3 d", "--out", tiny_disk / "run"
@@ -386,7 +382,7 @@ CASES = [(path, name) for path, names in FAILING.items() for name in names]
 
 
 @pytest.mark.parametrize(("where", "name"), CASES, ids=[name for _, name in CASES])
-def test_a_component_that_fails_is_named_with_exit_1(fleet2d: Cli, where: str, name: str) -> None:
+def test_a_component_that_fails_is_named_with_exit_1(fleet2d, where, name):
     Path("mine.py").write_text(COMPONENTS)
     bucket, entry = where.split(".")
     fields = {"type": f"mine:{name}", **({"period": "60 s"} if bucket == "algorithms" else {})}
@@ -402,7 +398,7 @@ def test_a_component_that_fails_is_named_with_exit_1(fleet2d: Cli, where: str, n
     assert "failed" == json.loads(Path("run/manifest.json").read_text())["status"]
 
 
-def test_a_metric_that_fails_leaves_what_was_stored_before(fleet2d: Cli) -> None:
+def test_a_metric_that_fails_leaves_what_was_stored_before(fleet2d):
     Path("mine.py").write_text(
         "from fleet2d import Metric\n\n\nclass Breaks(Metric):\n"
         "    def update(self, history, state):\n        raise RuntimeError('no ruler')\n"
@@ -418,7 +414,7 @@ def test_a_metric_that_fails_leaves_what_was_stored_before(fleet2d: Cli) -> None
     assert [] == run.verify()
 
 
-def test_a_module_that_fails_to_import_is_named(fleet2d: Cli) -> None:
+def test_a_module_that_fails_to_import_is_named(fleet2d):
     Path("mine.py").write_text("raise RuntimeError('half written')")
     scenario_file = written(small(users={"ana": {"type": "mine:Walk"}}))
     code, _, err = fleet2d("run", scenario_file, "--out", "run")
@@ -428,7 +424,7 @@ def test_a_module_that_fails_to_import_is_named(fleet2d: Cli) -> None:
     assert not Path("run").exists()
 
 
-def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
+def test_a_module_that_fails_to_import_is_told_once(fleet2d):
     Path("mine.py").write_text("x = 1\ny = z\n")
     users = {"ana": {"type": "mine:Walk"}, "bob": "mine:Sit"}
     scenario_file = written(small(users=users, algorithms={"a": "mine:Count"}))
@@ -479,12 +475,12 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d: Cli) -> None:
         (["convert", "nothing.yaml", "new.yaml"], ["nothing.yaml"]),
     ],
 )  # fmt: skip
-def test_a_wrong_call_is_refused(fleet2d: Cli, arguments: list[str], words: list[str]) -> None:
+def test_a_wrong_call_is_refused(fleet2d, arguments, words):
     written(small())
     check(fleet2d(*arguments), 2, words, {"home.yaml"})
 
 
-def test_a_process_ends_with_the_same_code_and_words(tmp_path: Path) -> None:
+def test_a_process_ends_with_the_same_code_and_words(tmp_path):
     """The same through the real entry point."""
     done = fleet2d_process("run", "nothing.yaml", cwd=tmp_path)
     assert 2 == done.returncode
@@ -495,7 +491,7 @@ def test_a_process_ends_with_the_same_code_and_words(tmp_path: Path) -> None:
     assert [] == list(tmp_path.iterdir())
 
 
-def test_a_flat_that_moved_is_named_by_the_file_that_names_it(fleet2d: Cli) -> None:
+def test_a_flat_that_moved_is_named_by_the_file_that_names_it(fleet2d):
     Path("plans").mkdir()
     plan = write_flat(Path("plans"))
     content = small()

@@ -59,7 +59,7 @@ def content(what: str, **more: Any) -> dict[str, Any]:
     }
 
 
-def test_a_run_starts_from_the_learned_state_of_another(tmp_path: Path) -> None:
+def test_a_run_starts_from_the_learned_state_of_another(tmp_path):
     first = run(content("Counts"), "artifacts.learned=true", out=tmp_path / "first")
     learned = tmp_path / "first" / "learned" / "mine.npz"
     second = run(content("Counts", learned=str(learned)), out=tmp_path / "second")
@@ -73,21 +73,19 @@ def test_a_run_starts_from_the_learned_state_of_another(tmp_path: Path) -> None:
     assert str(learned) in {Path(file["path"]).as_posix() for file in second.manifest["inputs"]}
 
 
-def test_nothing_is_stored_unasked(tmp_path: Path) -> None:
+def test_nothing_is_stored_unasked(tmp_path):
     run(content("Counts"), out=tmp_path / "run")
     assert not (tmp_path / "run" / "learned").exists()
 
 
-def test_learned_state_that_cannot_be_stored_is_reported_and_the_run_is_complete(
-    tmp_path: Path,
-) -> None:
+def test_learned_state_that_cannot_be_stored_is_reported_and_the_run_is_complete(tmp_path):
     stored = run(content("Hoards"), "artifacts.learned=true", out=tmp_path / "run")
 
     assert "complete" == stored.manifest["status"]
     assert any("'queue'" in note and "remember()" in note for note in stored.manifest["notes"])
 
 
-def test_learned_state_of_another_home_is_refused(tmp_path: Path) -> None:
+def test_learned_state_of_another_home_is_refused(tmp_path):
     path = tmp_path / "mine.npz"
     save_learned({"counts": np.zeros(99)}, path, "mine")
     with pytest.raises(ComponentError, match=r"'counts' of shape \(99,\).*in another home"):
@@ -95,14 +93,14 @@ def test_learned_state_of_another_home_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "nonsense", "PK\x03\x04"])
-def test_a_file_that_is_none_is_refused_in_plain_words(tmp_path: Path, text: str) -> None:
+def test_a_file_that_is_none_is_refused_in_plain_words(tmp_path, text):
     path = tmp_path / "mine.npz"
     path.write_text(text)
     with pytest.raises(InputError, match="is not a file of learned state"):
         run(content("Counts", learned=str(path)))
 
 
-def test_nested_mappings_come_back(tmp_path: Path) -> None:
+def test_nested_mappings_come_back(tmp_path):
     state = {"a": {"b": np.eye(2), "c": {"d": 1.5}}, "e": "word", "f": True}
     save_learned(state, tmp_path / "x.npz", "x")
     loaded = load_learned(tmp_path / "x.npz")
@@ -111,7 +109,7 @@ def test_nested_mappings_come_back(tmp_path: Path) -> None:
     assert {"a": {"c": {"d": 1.5}}, "e": "word", "f": True} == loaded
 
 
-def test_looking_back_returns_the_requested_steps() -> None:
+def test_looking_back_returns_the_requested_steps():
     stored = run({**content("LooksBack"), "metrics": {"distance": {"period": "10 min"}}})
     steps = stored.tables["mine"]["steps"].to_pylist()
 
@@ -121,10 +119,10 @@ def test_looking_back_returns_the_requested_steps() -> None:
     assert whole["moved"][0].as_py() > 0
 
 
-def test_looking_back_farther_than_declared_is_refused() -> None:
+def test_looking_back_farther_than_declared_is_refused():
     with pytest.raises(ComponentError, match="set looks_back in the class"):
         run(content("LooksBack", minutes=31))
 
 
-def test_looking_back_is_the_same_for_every_span() -> None:
+def test_looking_back_is_the_same_for_every_span():
     assert run(content("LooksBack")).digest == run(content("LooksBack"), max_span=11).digest

@@ -52,13 +52,13 @@ def sightings(rows: list[tuple[int, int, int]]) -> PlacedSightings:
     return PlacedSightings(step, np.arange(len(rows), dtype=np.int32), user, room)
 
 
-def test_bins_last_a_minute_or_a_step() -> None:
+def test_bins_last_a_minute_or_a_step():
     assert [60, 120, 2, 1, 1] == [
         steps_of_bin(us) for us in (1_000_000, 500_000, 25_000_000, 60_000_000, 600_000_000)
     ]
 
 
-def test_users_perceived_by_two_robots_count_once_and_strangers_only_as_anyone() -> None:
+def test_users_perceived_by_two_robots_count_once_and_strangers_only_as_anyone():
     rows = [(0, 0, 1), (0, 0, 1), (1, 0, 1), (1, -1, 1), (59, 1, 0), (60, -1, 0), (120, 0, 0)]
 
     seen = SightingCounts.of_observations(sightings(rows), 60, (2, 3, 2)).dense
@@ -67,7 +67,7 @@ def test_users_perceived_by_two_robots_count_once_and_strangers_only_as_anyone()
     assert [[0, 0], [0, 0], [1, 0]] == seen[1].tolist()
 
 
-def test_nobody_perceived_is_evidence_of_zeros() -> None:
+def test_nobody_perceived_is_evidence_of_zeros():
     assert 0 == SightingCounts.of_observations(sightings([]), 60, (3, 2, 2)).dense.sum()
 
 
@@ -79,7 +79,7 @@ def evidence_of(period: str, what: str = "Tell", **settings: Any) -> Any:
 
 
 @pytest.mark.parametrize("max_span", [7, None])
-def test_bins_sum_up_to_the_exposure_whatever_the_spans(max_span: int | None) -> None:
+def test_bins_sum_up_to_the_exposure_whatever_the_spans(max_span):
     rows = evidence_of("10 min", max_span=max_span).tables["tell"].to_pandas()
 
     assert 6 == rows["begin"].nunique()
@@ -89,11 +89,11 @@ def test_bins_sum_up_to_the_exposure_whatever_the_spans(max_span: int | None) ->
     assert rows["seen"].sum() > 0
 
 
-def test_missing_needs_are_a_clear_error() -> None:
+def test_missing_needs_are_a_clear_error():
     with pytest.raises(ComponentError, match=r"needs = \{'evidence'\}"):
         evidence_of("10 min", "Unsaid")
 
 
-def test_a_period_of_half_minutes_is_refused() -> None:
+def test_a_period_of_half_minutes_is_refused():
     with pytest.raises(ComponentError, match="whole minutes"):
         evidence_of("90 s")

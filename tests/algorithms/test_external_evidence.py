@@ -26,7 +26,7 @@ def simulated(*overrides: str, **settings: Any) -> Run:
 
 
 @pytest.fixture(scope="module")
-def run() -> Run:
+def run():
     return simulated()
 
 
@@ -34,7 +34,7 @@ def columns(run: Run, name: str = "evidence") -> dict[str, np.ndarray[Any, Any]]
     return {k: np.array(v, object) for k, v in run.arrow(name).to_pydict().items()}
 
 
-def test_rows_are_of_the_bins_own_time(run: Run) -> None:
+def test_rows_are_of_the_bins_own_time(run):
     rows = columns(run)
 
     minutes = rows["bin"].astype(int) // 60 + 6 * 60
@@ -43,7 +43,7 @@ def test_rows_are_of_the_bins_own_time(run: Run) -> None:
     assert (np.diff(rows["bin"].astype(int)) >= 0).all()
 
 
-def test_sightings_are_those_of_the_observations(run: Run) -> None:
+def test_sightings_are_those_of_the_observations(run):
     rows, seen = columns(run), columns(run, "observations")
     of_ana = rows["user"] == "ana"
 
@@ -52,7 +52,7 @@ def test_sightings_are_those_of_the_observations(run: Run) -> None:
     assert set(steps // 60 * 60) == set(rows["bin"][of_ana])
 
 
-def test_rooms_that_were_looked_at_and_empty_have_rows(run: Run) -> None:
+def test_rooms_that_were_looked_at_and_empty_have_rows(run):
     rows = columns(run)
     kinds = {room.name: room.type for room in run.plan.rooms}
 
@@ -62,7 +62,7 @@ def test_rooms_that_were_looked_at_and_empty_have_rows(run: Run) -> None:
     assert all(kinds[room] == kind for room, kind in zip(rows["room"], rows["kind"], strict=True))
 
 
-def test_a_person_who_is_never_in_view_changes_nothing() -> None:
+def test_a_person_who_is_never_in_view_changes_nothing():
     """Ben lives in a room that the robot never looks into: whatever he does, the rows are equal."""
     stays = "[{type: patrol, rooms: [kitchen], dwell: 1 h}]"
     rows = []
@@ -79,7 +79,7 @@ def test_a_person_who_is_never_in_view_changes_nothing() -> None:
     assert set(rows[0]["user"]) <= {"anyone"}
 
 
-def test_the_future_changes_nothing(run: Run) -> None:
+def test_the_future_changes_nothing(run):
     shorter = columns(simulated("simulation.duration=3 h"))
 
     longer = columns(run)
@@ -87,7 +87,7 @@ def test_the_future_changes_nothing(run: Run) -> None:
     assert all(np.array_equal(shorter[name], longer[name][early]) for name in shorter)
 
 
-def test_without_users_there_are_looks_only() -> None:
+def test_without_users_there_are_looks_only():
     rows = columns(simulated(users={"ana": None}))
 
     assert set(rows["user"]) == {"anyone"}

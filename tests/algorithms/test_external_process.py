@@ -43,7 +43,7 @@ def scenario(command: Path, **settings: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def compiled(tmp_path_factory):
     compiler = shutil.which("g++")
     if compiler is None:
         pytest.skip("there is no g++")
@@ -60,20 +60,20 @@ def expected() -> Any:
     return fleet2d.run(content).tables["share"].to_pylist()
 
 
-def test_a_python_program_learns_what_an_algorithm_does() -> None:
+def test_a_python_program_learns_what_an_algorithm_does():
     run = fleet2d.run(scenario(PROGRAMS / "share.py"))
 
     assert run.tables["share"].to_pylist() == expected()
     assert run.manifest["inputs"][0]["path"].endswith("share.py")
 
 
-def test_a_program_in_another_language_learns_the_same(compiled: Path) -> None:
+def test_a_program_in_another_language_learns_the_same(compiled):
     run = fleet2d.run(scenario(compiled, tables="json"))
     assert run.tables["share"].to_pylist() == expected()
 
 
 @pytest.mark.slow
-def test_copies_and_checkpoints_continue_from_its_state() -> None:
+def test_copies_and_checkpoints_continue_from_its_state():
     command = PROGRAMS / "share.py"
     simulation = fleet2d.Simulation(scenario(command))
     simulation.advance(9 * 3600)
@@ -85,7 +85,7 @@ def test_copies_and_checkpoints_continue_from_its_state() -> None:
 
 
 @pytest.mark.slow
-def test_every_span_length_gives_the_same_run() -> None:
+def test_every_span_length_gives_the_same_run():
     content = scenario(PROGRAMS / "share.py", sends=["observations", "evidence", "poses"])
     content["simulation"]["duration"] = "2 h"
 
@@ -107,7 +107,7 @@ def program(folder: Path, answers: str) -> Path:
     return path
 
 
-def test_a_program_that_is_not_ready_is_quoted(tmp_path: Path) -> None:
+def test_a_program_that_is_not_ready_is_quoted(tmp_path):
     path = tmp_path / "alg.py"
     path.write_text('input()\nprint(\'{"state": "ready"}\', flush=True)\ninput()\n')
 
@@ -145,7 +145,7 @@ def test_a_program_that_is_not_ready_is_quoted(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_program_that_fails_is_blamed(tmp_path: Path, answers: str, message: str) -> None:
+def test_a_program_that_fails_is_blamed(tmp_path, answers, message):
     content = scenario(program(tmp_path, answers), timeout="0.3 s")
 
     with pytest.raises(ComponentError) as caught:
@@ -155,7 +155,7 @@ def test_a_program_that_fails_is_blamed(tmp_path: Path, answers: str, message: s
     assert message in str(caught.value)
 
 
-def test_what_comes_between_two_answers_is_not_taken_for_the_next_one(tmp_path: Path) -> None:
+def test_what_comes_between_two_answers_is_not_taken_for_the_next_one(tmp_path):
     """A line that came late, of a thread's own, was the answer to the next question."""
     late = "say({'type': 'none'}); time.sleep(0.05); say({'type': 'none'})"
     asked = ExternalProgram(program(tmp_path, late), [], 5.0, {})
@@ -166,7 +166,7 @@ def test_what_comes_between_two_answers_is_not_taken_for_the_next_one(tmp_path: 
 
 
 @pytest.mark.slow
-def test_a_program_that_stops_reading_is_blamed(tmp_path: Path) -> None:
+def test_a_program_that_stops_reading_is_blamed(tmp_path):
     """More than a pipe holds was written to it without a limit of time."""
     path = tmp_path / "alg.py"
     path.write_text('import time\nprint(\'{"type": "ready"}\', flush=True)\ntime.sleep(60)\n')
@@ -176,7 +176,7 @@ def test_a_program_that_stops_reading_is_blamed(tmp_path: Path) -> None:
         fleet2d.run(content)
 
 
-def test_a_program_that_answers_while_it_is_told_is_heard(tmp_path: Path) -> None:
+def test_a_program_that_answers_while_it_is_told_is_heard(tmp_path):
     """Both sides write more than a pipe holds, before either reads."""
     path = tmp_path / "alg.py"
     path.write_text(
@@ -195,14 +195,14 @@ def test_a_program_that_answers_while_it_is_told_is_heard(tmp_path: Path) -> Non
     assert run.status == "complete"
 
 
-def test_a_program_runs_in_its_own_folder(tmp_path: Path) -> None:
+def test_a_program_runs_in_its_own_folder(tmp_path):
     (tmp_path / "answer.json").write_text('{"type": "none"}')
     run = fleet2d.run(scenario(program(tmp_path, "print(open('answer.json').read(), flush=True)")))
 
     assert run.status == "complete"
 
 
-def test_a_program_that_cannot_be_started_is_blamed(tmp_path: Path) -> None:
+def test_a_program_that_cannot_be_started_is_blamed(tmp_path):
     path = tmp_path / "alg"
     path.write_text("not a program")
 
@@ -210,7 +210,7 @@ def test_a_program_that_cannot_be_started_is_blamed(tmp_path: Path) -> None:
         fleet2d.run(scenario(path))
 
 
-def test_a_program_ends_with_its_simulation(tmp_path: Path) -> None:
+def test_a_program_ends_with_its_simulation(tmp_path):
     simulation = fleet2d.Simulation(scenario(PROGRAMS / "share.py"))
     simulation.advance(2 * 3600)
     process = simulation.algorithms["share"].program._process
@@ -222,7 +222,7 @@ def test_a_program_ends_with_its_simulation(tmp_path: Path) -> None:
     assert process.wait(5) == 0
 
 
-def test_a_program_that_is_not_trusted_does_not_run() -> None:
+def test_a_program_that_is_not_trusted_does_not_run():
     for content in (scenario(PROGRAMS / "share.py"), robots(PROGRAMS / "rounds.py")):
         with (
             running_code(allowed=False),
@@ -244,7 +244,7 @@ def robots(command: Path) -> dict[str, Any]:
     }
 
 
-def test_a_program_decides_where_the_robot_goes() -> None:
+def test_a_program_decides_where_the_robot_goes():
     run = fleet2d.run(robots(PROGRAMS / "rounds.py"))
 
     path = run.path("astro")
@@ -280,7 +280,7 @@ def behind_a_door(command: Path) -> dict[str, Any]:
     return robots(command) | {"objects": {"office_door": door}}
 
 
-def test_a_program_is_told_what_became_of_its_goals(tmp_path: Path) -> None:
+def test_a_program_is_told_what_became_of_its_goals(tmp_path):
     program, heard = errands(tmp_path, ["kitchen_1", "office_1", "hallway_1"])
 
     fleet2d.run(behind_a_door(program))
@@ -295,7 +295,7 @@ def test_a_program_is_told_what_became_of_its_goals(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["rounds.mjs", "rounds.rs"])
-def test_programs_for_node_and_in_rust_do_the_same(name: str, tmp_path: Path) -> None:
+def test_programs_for_node_and_in_rust_do_the_same(name, tmp_path):
     command = PROGRAMS / name
     tool = {".mjs": "node", ".rs": "rustc"}[command.suffix]
     if shutil.which(tool) is None:
@@ -309,20 +309,18 @@ def test_programs_for_node_and_in_rust_do_the_same(name: str, tmp_path: Path) ->
     assert run.digest == fleet2d.run(robots(PROGRAMS / "rounds.py")).digest
 
 
-def test_a_program_whose_interpreter_is_missing_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_program_whose_interpreter_is_missing_is_told(tmp_path, monkeypatch):
     (tmp_path / "rounds.mjs").write_text("")
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ComponentError, match="can't be started by node: No such file"):
         fleet2d.run(robots(tmp_path / "rounds.mjs"))
 
 
-def test_every_template_is_short() -> None:
+def test_every_template_is_short():
     assert all(len(file.read_text().splitlines()) <= 30 for file in PROGRAMS.iterdir())
 
 
-def test_a_copied_program_decides_as_the_first_one_would() -> None:
+def test_a_copied_program_decides_as_the_first_one_would():
     simulation = fleet2d.Simulation(robots(PROGRAMS / "rounds.py"))
     simulation.advance(3600)
 
@@ -338,7 +336,7 @@ def test_a_copied_program_decides_as_the_first_one_would() -> None:
         ("say({'type': 'plan', 'plan': [{'stay_s': 'x'}]})", "answered the item {'stay_s': 'x'}"),
     ],
 )
-def test_a_wrong_plan_is_blamed(tmp_path: Path, answers: str, message: str) -> None:
+def test_a_wrong_plan_is_blamed(tmp_path, answers, message):
     with pytest.raises((ComponentError, InputError)) as caught:
         fleet2d.run(robots(program(tmp_path, answers)))
 

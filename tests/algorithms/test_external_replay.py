@@ -38,7 +38,7 @@ def shares(run: Any, room: str) -> list[float]:
     return [r["share"] for r in run.tables["ltp"].to_pylist() if r["room"] == room]
 
 
-def test_the_newest_shares_are_put_out(tmp_path: Path) -> None:
+def test_the_newest_shares_are_put_out(tmp_path):
     run = fleet2d.run(scenario(write(tmp_path, ROWS), user="ana"))
 
     assert shares(run, "kitchen_1") == [0.75, 0.1, 0.1] or shares(run, "kitchen_1") == [
@@ -49,7 +49,7 @@ def test_the_newest_shares_are_put_out(tmp_path: Path) -> None:
     assert run.manifest["inputs"][0]["path"].endswith("belief.csv")
 
 
-def test_what_a_run_stored_is_put_out_again(tmp_path: Path) -> None:
+def test_what_a_run_stored_is_put_out_again(tmp_path):
     content = {"extends": "bundled:paper", "simulation": {"duration": "4 h", "seed": 4}}
     content["algorithms"] = {"ltp": {"type": "long_term_presence", "period": "1 h"}}
     first = fleet2d.run(content, out=tmp_path / "first")
@@ -73,22 +73,20 @@ def test_what_a_run_stored_is_put_out_again(tmp_path: Path) -> None:
         ("time,room\n0,kitchen_1\n", {}, "has no column 'share'"),
     ],
 )
-def test_a_table_of_another_home_is_refused(
-    tmp_path: Path, text: str, settings: dict[str, Any], message: str
-) -> None:
+def test_a_table_of_another_home_is_refused(tmp_path, text, settings, message):
     with pytest.raises(InputError, match=message):
         fleet2d.Simulation(scenario(write(tmp_path, text), **settings))
 
 
 @pytest.mark.parametrize("day", ["2026-01-04", "2026-01-06"])
-def test_a_table_of_another_time_is_refused_with_both_ranges(tmp_path: Path, day: str) -> None:
+def test_a_table_of_another_time_is_refused_with_both_ranges(tmp_path, day):
     path = write(tmp_path, ROWS.replace("2026-01-05", day))
     ranges = rf"from {day} 01:30:00 to {day} 03:00:00, and the run is from 2026-01-05 00:00:00 to"
     with pytest.raises(InputError, match=f"{ranges} 2026-01-05 04:00:00"):
         fleet2d.Simulation(scenario(path, user="ana"))
 
 
-def test_a_table_that_ends_during_the_run_is_put_out(tmp_path: Path) -> None:
+def test_a_table_that_ends_during_the_run_is_put_out(tmp_path):
     path = write(tmp_path, ROWS.replace("2026-01-05 01", "2026-01-04 01"))
 
     assert shares(fleet2d.run(scenario(path, user="ana")), "kitchen_1")[0] == 0.75

@@ -35,14 +35,14 @@ def activities(latency: int = 0) -> Activities:
     return result
 
 
-def test_the_true_activity_is_the_last_that_began_before_the_look() -> None:
+def test_the_true_activity_is_the_last_that_began_before_the_look():
     true = activities().true(rows([9, 10, 19, 20, 99]))
     assert [None, "cook", "cook", "read", "read"] == true.tolist()
     late = activities(latency=3).true(rows([12, 13, 22, 23]))
     assert [None, "cook", "cook", "read"] == late.tolist()
 
 
-def test_activities_are_confused_at_the_configured_rates() -> None:
+def test_activities_are_confused_at_the_configured_rates():
     one_user = Activities(1, {(0, 0): ActivitySense(0, KEYS, CONFUSION)})
     one_user.begin(0, 0, "cook")
     perceived = one_user.perceived(rows(list(range(20_000))))
@@ -50,26 +50,26 @@ def test_activities_are_confused_at_the_configured_rates() -> None:
         assert agree(perceived == name, share)
 
 
-def test_perceived_activities_do_not_depend_on_other_queries() -> None:
+def test_perceived_activities_do_not_depend_on_other_queries():
     every = list(range(5, 60))
     whole = activities().perceived(rows(every)).tolist()
     assert whole == [activities().perceived(rows([step])).tolist()[0] for step in every]
 
 
-def test_each_user_has_an_activity_and_nobody_has_none() -> None:
+def test_each_user_has_an_activity_and_nobody_has_none():
     two_users = activities()
     assert ["rest"] == two_users.perceived(rows([10], user=1)).tolist()
     assert [None] == two_users.perceived(rows([10], user=-1)).tolist()
     assert [None] == two_users.true(rows([10], user=-1)).tolist()
 
 
-def test_a_camera_that_does_not_tell_activities_has_only_the_truth() -> None:
+def test_a_camera_that_does_not_tell_activities_has_only_the_truth():
     there = rows([10], camera=1)
     assert [None] == activities().perceived(there).tolist()
     assert ["cook"] == activities().true(there).tolist()
 
 
-def test_activities_that_no_camera_perceives_are_not_computed() -> None:
+def test_activities_that_no_camera_perceives_are_not_computed():
     one_user = Activities(1, {(0, 0): ActivitySense(0, KEYS, None)})
     one_user.begin(0, 0, "cook")
     assert not one_user.are_perceived

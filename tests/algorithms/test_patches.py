@@ -21,7 +21,7 @@ def plans(shared_data: Path) -> list[fleet2d.FloorPlan]:
     return [fleet2d.load_floorplan(of) for of in ("family_home", "synthetic:7", expo)]
 
 
-def test_patches_divide_the_floor_of_each_room(shared_data: Path) -> None:
+def test_patches_divide_the_floor_of_each_room(shared_data):
     for plan in plans(shared_data):
         patches, rooms = patches_of(plan), plan.room_of_cell
         assert np.array_equal(patches.of_cell == NOWHERE, rooms == NOWHERE)
@@ -33,7 +33,7 @@ def test_patches_divide_the_floor_of_each_room(shared_data: Path) -> None:
         assert list(range(len(plan.rooms))) == patches.room[patches.first].tolist()
 
 
-def test_patches_are_boxes_of_about_a_metre_or_a_dozenth_of_the_room(shared_data: Path) -> None:
+def test_patches_are_boxes_of_about_a_metre_or_a_dozenth_of_the_room(shared_data):
     for plan in plans(shared_data):
         patches = patches_of(plan)
         for patch, room in enumerate(patches.room.tolist()):
@@ -42,7 +42,7 @@ def test_patches_are_boxes_of_about_a_metre_or_a_dozenth_of_the_room(shared_data
             assert (extent <= 1.5 * side + 2).all()
 
 
-def test_whole_rooms_are_patches_by_themselves(shared_data: Path) -> None:
+def test_whole_rooms_are_patches_by_themselves(shared_data):
     for plan in plans(shared_data):
         patches = whole_rooms(plan)
         assert patches.of_cell is plan.room_of_cell
@@ -50,7 +50,7 @@ def test_whole_rooms_are_patches_by_themselves(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_rooms_that_nothing_joins_are_on_islands_of_their_own(shared_data: Path) -> None:
+def test_rooms_that_nothing_joins_are_on_islands_of_their_own(shared_data):
     expo = shared_data / "houseexpo"
     plan = fleet2d.load_floorplan(next(expo.glob("69c2ebf7*.json")))
     island = patches_of(plan).island
@@ -82,7 +82,7 @@ class PatchSums(Algorithm):
 
 
 @pytest.mark.parametrize("max_span", [7, None])
-def test_evidence_by_patches_sums_up_to_that_by_rooms(max_span: int | None) -> None:
+def test_evidence_by_patches_sums_up_to_that_by_rooms(max_span):
     content = everything("1 h")
     content["robots"] = {"astro": content["robots"]["astro"]}
     content["algorithms"] = {"tell": {"type": f"{HERE}:PatchSums", "period": "10 min"}}

@@ -31,7 +31,7 @@ def taught(policy: TimingPolicy, count: int = 30) -> TimingPolicy:
 
 
 @pytest.mark.parametrize("policy", [LogisticTiming(), ThompsonTiming()])
-def test_a_learner_asks_when_it_is_welcome_and_not_when_it_is_not(policy: TimingPolicy) -> None:
+def test_a_learner_asks_when_it_is_welcome_and_not_when_it_is_not(policy):
     chances = taught(policy).chances()
 
     assert (24, ROOMS) == chances.shape
@@ -40,7 +40,7 @@ def test_a_learner_asks_when_it_is_welcome_and_not_when_it_is_not(policy: Timing
     assert chances[9, KITCHEN] >= chances[14, KITCHEN]
 
 
-def test_a_greedy_learner_never_learns_of_an_unlucky_hour_again() -> None:
+def test_a_greedy_learner_never_learns_of_an_unlucky_hour_again():
     """The feedback loop: it asks only where a yes is likely, and so never sees a better answer."""
     greedy, exploring = LogisticTiming(), LogisticTiming(explore=0.1)
     for policy in (greedy, exploring):
@@ -52,7 +52,7 @@ def test_a_greedy_learner_never_learns_of_an_unlucky_hour_again() -> None:
     assert 0.1 == exploring.chances()[8, KITCHEN]
 
 
-def test_thompson_learns_who_has_time_from_other_interactions() -> None:
+def test_thompson_learns_who_has_time_from_other_interactions():
     policy = ThompsonTiming()
     policy.start(ROOMS)
     for _ in range(10):
@@ -75,14 +75,14 @@ def experienced(worth: float, yeses: int, noes: int, **settings: float) -> float
     return float(policy.chances()[8, KITCHEN])
 
 
-def test_what_is_worth_little_is_asked_only_where_a_yes_is_nearly_sure() -> None:
+def test_what_is_worth_little_is_asked_only_where_a_yes_is_nearly_sure():
     assert experienced(5, 10, 10) > 0.9
     assert experienced(1.5, 10, 10) < 0.1
     assert experienced(1.5, 20, 0) > 0.9
     assert 0.02 == experienced(0, 20, 0)
 
 
-def test_who_never_agrees_is_asked_at_no_hour_and_who_has_no_time_at_that_hour() -> None:
+def test_who_never_agrees_is_asked_at_no_hour_and_who_has_no_time_at_that_hour():
     policy = TwoStageTiming()
     policy.start(ROOMS)
     policy.worth = 5
@@ -96,7 +96,7 @@ def test_who_never_agrees_is_asked_at_no_hour_and_who_has_no_time_at_that_hour()
     assert policy.chances()[:, KITCHEN].max() < 0.1
 
 
-def test_a_policy_knows_what_the_interaction_is_worth() -> None:
+def test_a_policy_knows_what_the_interaction_is_worth():
     class Greedy(FixedTimes):
         """Asks only for what is worth more than 3."""
 
@@ -107,14 +107,14 @@ def test_a_policy_knows_what_the_interaction_is_worth() -> None:
     assert {1.0} == set(table(run, "when")["chance"])  # the pill is worth 4
 
 
-def test_thompson_explores_less_the_more_it_knows() -> None:
+def test_thompson_explores_less_the_more_it_knows():
     few, many = (taught(ThompsonTiming(min_chance=0.0), count).chances() for count in (1, 40))
 
     assert 0.05 < few[14, BEDROOM] < 0.6
     assert many[14, BEDROOM] < 0.01
 
 
-def test_fixed_times_learn_nothing() -> None:
+def test_fixed_times_learn_nothing():
     policy = taught(FixedTimes(hours=(7, 8)))
     expected = np.zeros((24, ROOMS))
     expected[[7, 8]] = 1
@@ -132,7 +132,7 @@ def timed(policy: Any, duration: str = "3 h", **changes: Any) -> dict[str, Any]:
     )
 
 
-def test_answers_reach_the_learner_and_its_chances_reach_the_robot() -> None:
+def test_answers_reach_the_learner_and_its_chances_reach_the_robot():
     policy = {"type": "thompson", "ask_at": 0.5}
     run = fleet2d.run(timed(policy, users={"ana": ana(outcomes=("declined",))}))
     rows = table(run, "when")
@@ -150,7 +150,7 @@ def test_answers_reach_the_learner_and_its_chances_reach_the_robot() -> None:
     assert "opportunity" in {event for _, event in events_of(run, "opportunity")}
 
 
-def test_every_answer_changes_the_chances_of_a_question_that_was_asked_before() -> None:
+def test_every_answer_changes_the_chances_of_a_question_that_was_asked_before():
     run = fleet2d.run(timed("thompson", users={"ana": ana(outcomes=("declined",))}))
     answered = {step // 3600 for step, _ in events_of(run, "declined")}
     rows = table(run, "when")
@@ -159,27 +159,27 @@ def test_every_answer_changes_the_chances_of_a_question_that_was_asked_before() 
     assert answered <= {int(step) // 3600 for step in rows["step"]}
 
 
-def test_outside_of_the_fixed_times_nobody_is_asked() -> None:
+def test_outside_of_the_fixed_times_nobody_is_asked():
     run = fleet2d.run(timed({"type": "fixed_times", "hours": []}, "5 h"))
     asks = [step for step, _ in events_of(run, "asks")]
 
     assert len(asks) <= 1  # before the first answer there is no experience
 
 
-def test_spans_are_invisible_to_the_learner() -> None:
+def test_spans_are_invisible_to_the_learner():
     content = timed("thompson", "2 h")
     content["users"]["ana"] = ana() | {"answers": {"defers": 0.5}}
     other = {**content, "simulation": {**content["simulation"], "max_span": 7}}
     assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))
 
 
-def test_hours_that_no_day_has_are_refused() -> None:
+def test_hours_that_no_day_has_are_refused():
     for hour in (-1, 24):
         with pytest.raises(ValueError, match="hours"):
             FixedTimes(hours=(hour,))
 
 
-def test_an_algorithm_without_chances_of_asking_is_refused_as_timing() -> None:
+def test_an_algorithm_without_chances_of_asking_is_refused_as_timing():
     behavior = {"type": "interact", "timing": "ltp"}
     content = home("1 h", robots={"astro": {"behaviors": [behavior]}})
     content["algorithms"] = {"ltp": {"type": "long_term_presence", "period": "10 min"}}

@@ -14,7 +14,7 @@ from fleet2d.artifacts.manifest import InputRecord, Manifest, input_record, plai
 from fleet2d.errors import RunDirectoryError
 
 
-def test_plain_has_words_for_what_models_hold() -> None:
+def test_plain_has_words_for_what_models_hold():
     given = {
         "n": np.int32(3),
         "a": np.array([1.5, np.nan]),
@@ -37,7 +37,7 @@ def test_plain_has_words_for_what_models_hold() -> None:
     assert expected == plain(given)
 
 
-def test_manifest_round_trip(tmp_path: Path) -> None:
+def test_manifest_round_trip(tmp_path):
     manifest = Manifest(status="complete", seed=4, steps=10, step_us=10**6, start="2026-01-05")
     manifest.write(tmp_path)
 
@@ -45,7 +45,7 @@ def test_manifest_round_trip(tmp_path: Path) -> None:
     assert ["manifest.json"] == [path.name for path in tmp_path.iterdir()]
 
 
-def test_manifest_is_sorted_and_strict_json(tmp_path: Path) -> None:
+def test_manifest_is_sorted_and_strict_json(tmp_path):
     Manifest(metrics={"b": math.nan, "a": np.float64(math.inf)}).write(tmp_path)
 
     def refuse(word: str) -> None:
@@ -70,14 +70,14 @@ def test_manifest_is_sorted_and_strict_json(tmp_path: Path) -> None:
         ("\x00\xff", "is damaged"),
     ],
 )
-def test_damaged_manifest_is_named(tmp_path: Path, text: str, message: str) -> None:
+def test_damaged_manifest_is_named(tmp_path, text, message):
     (tmp_path / "manifest.json").write_bytes(text.encode("latin-1"))
 
     with pytest.raises(RunDirectoryError, match=message):
         Manifest.read(tmp_path)
 
 
-def test_input_record_hashes_the_bytes(tmp_path: Path) -> None:
+def test_input_record_hashes_the_bytes(tmp_path):
     (tmp_path / "plan.json").write_bytes(b"walls")
 
     path = tmp_path / "plan.json"
@@ -85,7 +85,7 @@ def test_input_record_hashes_the_bytes(tmp_path: Path) -> None:
     assert expected == input_record(path)
 
 
-def test_versions_name_all_that_numbers_depend_on() -> None:
+def test_versions_name_all_that_numbers_depend_on():
     names = versions()
 
     expected = {"fleet2d", "numpy", "platform", "pyarrow", "python", "shapely"}
@@ -93,7 +93,7 @@ def test_versions_name_all_that_numbers_depend_on() -> None:
     assert np.__version__ == names["numpy"]
 
 
-def test_fields_are_filled_from_what_the_engine_knows_of_a_run() -> None:
+def test_fields_are_filled_from_what_the_engine_knows_of_a_run():
     users = {"ana": {"type": "meander"}, "ben": {}}
     stored = run(scenario("5 min", users=users, robots={"astro": {}}))
     manifest = Manifest.model_validate(stored.manifest)

@@ -35,12 +35,12 @@ def digest(rows: dict[str, Any], **options: Any) -> str | None:
 
 @settings(max_examples=examples(25))
 @given(pieces=st.integers(1, 60), flush_rows=st.integers(1, 700))
-def test_digest_independent_of_chunking(pieces: int, flush_rows: int) -> None:
+def test_digest_independent_of_chunking(pieces, flush_rows):
     assert digest(ROWS) == digest(ROWS, pieces=pieces, flush_rows=flush_rows)
 
 
 @pytest.mark.parametrize("flush_rows", [7, 100, 2**17])
-def test_digest_of_file_equals_that_in_memory(tmp_path: Path, flush_rows: int) -> None:
+def test_digest_of_file_equals_that_in_memory(tmp_path, flush_rows):
     store = stored(ROWS, directory=tmp_path / "run", flush_rows=flush_rows)
     table = open_run(tmp_path / "run").arrow("every_kind")
 
@@ -48,7 +48,7 @@ def test_digest_of_file_equals_that_in_memory(tmp_path: Path, flush_rows: int) -
     assert store.close_tables()["every_kind"] == digest_table(table)
 
 
-def test_digest_table_independent_of_arrow_layout(tmp_path: Path) -> None:
+def test_digest_table_independent_of_arrow_layout(tmp_path):
     stored(ROWS, directory=tmp_path / "run", flush_rows=64)
     table = open_run(tmp_path / "run").arrow("every_kind")
     one_piece = table.combine_chunks()
@@ -90,7 +90,7 @@ def _changed(name: str, value: Any) -> Callable[[dict[str, Any]], dict[str, Any]
         lambda rows: {name: values[::-1] for name, values in rows.items()},
     ],
 )
-def test_digest_changes_with_content(change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+def test_digest_changes_with_content(change):
     rows = {**ROWS, "what": ROWS["what"].copy()}
     rows["what"][123] = "seen"
     rows["total"] = rows["total"].copy()
@@ -99,7 +99,7 @@ def test_digest_changes_with_content(change: Callable[[dict[str, Any]], dict[str
     assert digest(rows) != digest(change(rows))
 
 
-def test_digest_changes_with_names_kinds_categories_and_order() -> None:
+def test_digest_changes_with_names_kinds_categories_and_order():
     def of(table: str, *columns: Column) -> str | None:
         spec = TableSpec(table, columns)
         return digest({column.name: [0, 1] for column in columns} | {"step": [0, 1]}, spec=spec)
@@ -122,21 +122,21 @@ def test_digest_changes_with_names_kinds_categories_and_order() -> None:
     assert len(digests) == len(set(digests))
 
 
-def test_strings_are_told_apart_where_they_join() -> None:
+def test_strings_are_told_apart_where_they_join():
     spec = TableSpec("t", (Column("step", "step"), Column("said", "string")))
 
     one = digest({"step": [0, 1], "said": ["ab", "c"]}, spec=spec)
     assert one != digest({"step": [0, 1], "said": ["a", "bc"]}, spec=spec)
 
 
-def test_missing_value_is_not_zero() -> None:
+def test_missing_value_is_not_zero():
     spec = TableSpec("t", (Column("step", "step"), Column("x", "float64", nullable=True)))
 
     missing = digest({"step": [0], "x": [np.nan]}, spec=spec)
     assert missing != digest({"step": [0], "x": [0.0]}, spec=spec)
 
 
-def test_digest_of_nan_independent_of_its_bits() -> None:
+def test_digest_of_nan_independent_of_its_bits():
     spec = TableSpec("t", (Column("step", "step"), Column("x", "float64", nullable=True)))
     nans = np.array([0x7FF8000000000000, 0xFFF8000000000001], np.uint64).view(np.float64)
 
@@ -145,7 +145,7 @@ def test_digest_of_nan_independent_of_its_bits() -> None:
     )
 
 
-def test_digest_known_value() -> None:
+def test_digest_known_value():
     """A change of how digests are taken makes every stored run differ: it must be meant."""
     spec = TableSpec("events", (Column("step", "step"), Column("what", "category")))
 
@@ -153,7 +153,7 @@ def test_digest_known_value() -> None:
     assert expected == digest({"step": [0, 5], "what": ["seen", "lost"]}, spec=spec)
 
 
-def test_run_digest_independent_of_order_of_tables() -> None:
+def test_run_digest_independent_of_order_of_tables():
     assert run_digest({"a": "1", "b": "2"}) == run_digest({"b": "2", "a": "1"})
     assert run_digest({"a": "1", "b": "2"}) != run_digest({"a": "2", "b": "1"})
 
@@ -166,7 +166,7 @@ CHANGES = int(os.environ.get("FLEET2D_CHANGES", "100" if THOROUGH else "40"))
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Path:
+def run(tmp_path):
     return Path(shutil.copytree(STORED_RUN, tmp_path / "run"))
 
 
@@ -178,7 +178,7 @@ def edited(directory: Path, change: Any) -> None:
     path.write_text(json.dumps(content, indent=2, sort_keys=True) + "\n")
 
 
-def test_a_run_of_long_ago_is_read() -> None:
+def test_a_run_of_long_ago_is_read():
     stored_run = open_run(STORED_RUN)
     assert FORMAT == stored_run.manifest["format"]
     assert [] == stored_run.verify()
@@ -192,7 +192,7 @@ def test_a_run_of_long_ago_is_read() -> None:
     assert stored_run.manifest["seal"]["digest"] == verification.digest
 
 
-def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
+def test_any_change_of_bytes_is_noticed_and_its_file_named(run):
     rng = random.Random(5)
     files = sorted(path for path in run.rglob("*") if path.is_file())
     contents = {path: path.read_bytes() for path in files}
@@ -244,12 +244,12 @@ def test_any_change_of_bytes_is_noticed_and_its_file_named(run: Path) -> None:
         (lambda m: m["seal"].update(digest="0" * 64), "seal"),
     ],
 )
-def test_a_changed_field_is_named(run: Path, change: Any, field: str) -> None:
+def test_a_changed_field_is_named(run, change, field):
     edited(run, change)
     assert [f"manifest.json: {field}"] == list(verify_run(run).differing)
 
 
-def test_another_order_of_users_is_a_change(tmp_path: Path) -> None:
+def test_another_order_of_users_is_a_change(tmp_path):
     users = {"zoe": {"type": "meander"}, "ana": {"type": "meander"}}
     fleet2d.run(scenario("1 min", users=users), out=tmp_path / "run")
     path = tmp_path / "run" / "manifest.json"
@@ -260,14 +260,14 @@ def test_another_order_of_users_is_a_change(tmp_path: Path) -> None:
     assert ["manifest.json: scenario.users"] == list(verify_run(tmp_path / "run").differing)
 
 
-def test_a_table_may_not_hide_from_the_seal(run: Path) -> None:
+def test_a_table_may_not_hide_from_the_seal(run):
     edited(run, lambda m: m["seal"]["files"].pop("events.parquet"))
     differing = verify_run(run).differing
     assert "manifest.json: seal" in differing
     assert "events.parquet" in differing
 
 
-def test_missing_and_foreign_files_are_named(run: Path) -> None:
+def test_missing_and_foreign_files_are_named(run):
     (run / "events.parquet").unlink()
     (run / "more.parquet").write_text("?")
     (run / "learned" / "more.npz").write_text("?")
@@ -285,7 +285,7 @@ def test_missing_and_foreign_files_are_named(run: Path) -> None:
     assert "more" not in open_run(run).tables
 
 
-def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path: Path) -> None:
+def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path):
     Manifest().write(tmp_path)
     with pytest.raises(ArtifactError, match="no digest"):
         verify_run(tmp_path)
@@ -293,7 +293,7 @@ def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path: Path) -> None:
         verify_run(tmp_path / "nothing")
 
 
-def test_the_seal_covers_a_run_of_plain_tables(tmp_path: Path) -> None:
+def test_the_seal_covers_a_run_of_plain_tables(tmp_path):
     stored(rows_of_every_kind(50), directory=tmp_path / "run")
     verification = verify_run(tmp_path / "run")
     assert verification.same
@@ -335,9 +335,7 @@ def test_the_seal_covers_a_run_of_plain_tables(tmp_path: Path) -> None:
         (lambda m: m.update(expectations={"quiet": {}}), ["expectations.quiet.expectation"]),
     ],
 )  # fmt: skip
-def test_an_edited_manifest_is_refused_with_the_field(
-    run: Path, change: Any, words: list[str]
-) -> None:
+def test_an_edited_manifest_is_refused_with_the_field(run, change, words):
     edited(run, change)
     with pytest.raises(RunDirectoryError) as caught:
         open_run(run)
@@ -358,13 +356,13 @@ def test_an_edited_manifest_is_refused_with_the_field(
         ('{"format": ' + "9" * 5000 + "}", "damaged"),
     ],
 )
-def test_a_strange_text_is_refused(tmp_path: Path, text: str, word: str) -> None:
+def test_a_strange_text_is_refused(tmp_path, text, word):
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(RunDirectoryError, match=word):
         open_run(tmp_path)
 
 
-def test_a_pipe_is_no_manifest(tmp_path: Path) -> None:
+def test_a_pipe_is_no_manifest(tmp_path):
     os.mkfifo(tmp_path / "manifest.json")
     with pytest.raises(RunDirectoryError, match="is not a file"):
         open_run(tmp_path)
@@ -406,7 +404,7 @@ def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.slow
-def test_no_edited_manifest_gives_a_traceback(run: Path) -> None:
+def test_no_edited_manifest_gives_a_traceback(run):
     """Opened, verified, read and drawn from: every failure is an error of Fleet2D."""
     path, rng = run / "manifest.json", random.Random(11)
     content = json.loads(path.read_text())

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -38,11 +37,11 @@ from .tables import EVERY_KIND, part, rows_of_every_kind, stored
         (timedelta(hours=2), timedelta(hours=2)),
     ],
 )
-def test_trajectories_take_off_every_step_or_a_duration(value: Any, expected: Any) -> None:
+def test_trajectories_take_off_every_step_or_a_duration(value, expected):
     assert expected == ArtifactSettings(trajectories=value).trajectories
 
 
-def test_default_is_every_simulated_hour_and_all_else() -> None:
+def test_default_is_every_simulated_hour_and_all_else():
     settings = ArtifactSettings()
 
     assert timedelta(hours=1) == settings.trajectories
@@ -53,12 +52,12 @@ def test_default_is_every_simulated_hour_and_all_else() -> None:
 
 
 @pytest.mark.parametrize("value", ["sometimes", "5 m", True, -1, "0 s"])
-def test_trajectories_refuse_anything_else(value: Any) -> None:
+def test_trajectories_refuse_anything_else(value):
     with pytest.raises(ValidationError):
         ArtifactSettings(trajectories=value)
 
 
-def test_every_field_is_described() -> None:
+def test_every_field_is_described():
     assert descriptions(ArtifactSettings).keys() == ArtifactSettings.model_fields.keys()
 
 
@@ -77,7 +76,7 @@ def names_in(directory: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("flush_rows", [3, 64, 2**17])
-def test_rows_come_back_as_they_were_given(tmp_path: Path, flush_rows: int) -> None:
+def test_rows_come_back_as_they_were_given(tmp_path, flush_rows):
     rows = rows_of_every_kind(200)
     stored(rows, directory=tmp_path / "run", pieces=7, flush_rows=flush_rows)
 
@@ -96,7 +95,7 @@ def test_rows_come_back_as_they_were_given(tmp_path: Path, flush_rows: int) -> N
     assert rows["said"] == table["said"].to_pylist()
 
 
-def test_memory_and_file_give_the_same_tables(tmp_path: Path) -> None:
+def test_memory_and_file_give_the_same_tables(tmp_path):
     rows = rows_of_every_kind(200)
     stored(rows, directory=tmp_path / "run", pieces=7, flush_rows=50)
     memory = open_store(stored(rows, pieces=3))
@@ -106,7 +105,7 @@ def test_memory_and_file_give_the_same_tables(tmp_path: Path) -> None:
     assert memory.digest == disk.digest
 
 
-def test_categories_are_whole_and_in_order_in_every_chunk(tmp_path: Path) -> None:
+def test_categories_are_whole_and_in_order_in_every_chunk(tmp_path):
     rows = rows_of_every_kind(200)
     rows["room"] = np.full(200, 1, np.int32)
     rows["what"] = np.array(["late"] * 150 + ["early"] * 50)
@@ -118,7 +117,7 @@ def test_categories_are_whole_and_in_order_in_every_chunk(tmp_path: Path) -> Non
         assert all(expected == part.dictionary.to_pylist() for part in table[column].chunks)
 
 
-def test_row_groups_are_no_larger_than_the_flush_size(tmp_path: Path) -> None:
+def test_row_groups_are_no_larger_than_the_flush_size(tmp_path):
     stored(rows_of_every_kind(250), directory=tmp_path / "run", flush_rows=100)
 
     metadata = pq.ParquetFile(tmp_path / "run" / "every_kind.parquet").metadata
@@ -126,7 +125,7 @@ def test_row_groups_are_no_larger_than_the_flush_size(tmp_path: Path) -> None:
     assert [100, 100, 50] == groups
 
 
-def test_same_rows_give_the_same_bytes(tmp_path: Path) -> None:
+def test_same_rows_give_the_same_bytes(tmp_path):
     for name in ("a", "b"):
         stored(rows_of_every_kind(300), directory=tmp_path / name)
 
@@ -134,7 +133,7 @@ def test_same_rows_give_the_same_bytes(tmp_path: Path) -> None:
     assert a.read_bytes() == b.read_bytes()
 
 
-def test_empty_tables_and_no_rows(tmp_path: Path) -> None:
+def test_empty_tables_and_no_rows(tmp_path):
     store = opened(tmp_path / "run", POSES, EVERY_KIND)
     store.append("poses", step=[], x=[])
     digests = store.close()
@@ -145,7 +144,7 @@ def test_empty_tables_and_no_rows(tmp_path: Path) -> None:
     assert digests == opened(None, POSES, EVERY_KIND).close()
 
 
-def test_run_without_tables(tmp_path: Path) -> None:
+def test_run_without_tables(tmp_path):
     store = RunStore(tmp_path / "run")
     store.open()
     store.close()
@@ -153,7 +152,7 @@ def test_run_without_tables(tmp_path: Path) -> None:
     assert [] == list(open_run(tmp_path / "run").tables)
 
 
-def test_table_may_be_added_later_and_again(tmp_path: Path) -> None:
+def test_table_may_be_added_later_and_again(tmp_path):
     store = opened(tmp_path / "run")
     store.append("poses", step=1, x=0.5)
     store.add_table(NOISE)
@@ -164,12 +163,12 @@ def test_table_may_be_added_later_and_again(tmp_path: Path) -> None:
     assert [1.0, 2.0] == open_run(tmp_path / "run").arrow("noise")["x"].to_pylist()
 
 
-def test_table_with_the_name_of_another_is_refused() -> None:
+def test_table_with_the_name_of_another_is_refused():
     with pytest.raises(ArtifactError, match="choose another name"):
         opened(None).add_table(TableSpec("poses", (Column("y", "bool"),)))
 
 
-def test_append_to_unknown_or_closed_is_refused(tmp_path: Path) -> None:
+def test_append_to_unknown_or_closed_is_refused(tmp_path):
     store = RunStore(tmp_path / "run", [POSES])
     with pytest.raises(ArtifactError, match=r"call open\(\)"):
         store.append("poses", step=1, x=0.5)
@@ -181,7 +180,7 @@ def test_append_to_unknown_or_closed_is_refused(tmp_path: Path) -> None:
         store.append("poses", step=1, x=0.5)
 
 
-def test_nothing_on_disk_before_open_and_nothing_after_discard(tmp_path: Path) -> None:
+def test_nothing_on_disk_before_open_and_nothing_after_discard(tmp_path):
     store = RunStore(tmp_path / "new" / "run", [POSES])
     store.check()
     assert [] == names_in(tmp_path)
@@ -191,12 +190,12 @@ def test_nothing_on_disk_before_open_and_nothing_after_discard(tmp_path: Path) -
     assert [] == names_in(tmp_path)
 
 
-def test_a_name_that_no_directory_can_have_is_found_before_the_run(tmp_path: Path) -> None:
+def test_a_name_that_no_directory_can_have_is_found_before_the_run(tmp_path):
     with pytest.raises(RunDirectoryError, match="File name too long"):
         RunStore(tmp_path / ("x" * 300)).check()
 
 
-def test_discard_before_open_touches_nothing(tmp_path: Path) -> None:
+def test_discard_before_open_touches_nothing(tmp_path):
     stored(rows_of_every_kind(3), directory=tmp_path / "run")
     before = names_in(tmp_path / "run")
 
@@ -204,7 +203,7 @@ def test_discard_before_open_touches_nothing(tmp_path: Path) -> None:
     assert before == names_in(tmp_path / "run")
 
 
-def test_empty_directory_is_taken_and_missing_parents_are_made(tmp_path: Path) -> None:
+def test_empty_directory_is_taken_and_missing_parents_are_made(tmp_path):
     (tmp_path / "empty").mkdir()
     for directory in (tmp_path / "empty", tmp_path / "a" / "b" / "c"):
         opened(directory).close()
@@ -212,7 +211,7 @@ def test_empty_directory_is_taken_and_missing_parents_are_made(tmp_path: Path) -
         assert "complete" == open_run(directory).status
 
 
-def test_directory_that_holds_something_is_refused(tmp_path: Path) -> None:
+def test_directory_that_holds_something_is_refused(tmp_path):
     (tmp_path / "file").write_text("mine")
 
     with pytest.raises(RunDirectoryError, match="not empty: choose another --out or remove it"):
@@ -221,7 +220,7 @@ def test_directory_that_holds_something_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("below", [".", "deeper/still"])
-def test_file_in_the_way_is_refused(tmp_path: Path, below: str) -> None:
+def test_file_in_the_way_is_refused(tmp_path, below):
     (tmp_path / "file").write_text("mine")
 
     with pytest.raises(RunDirectoryError, match="is not a directory"):
@@ -230,7 +229,7 @@ def test_file_in_the_way_is_refused(tmp_path: Path, below: str) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
-def test_directory_without_permission_is_refused(tmp_path: Path) -> None:
+def test_directory_without_permission_is_refused(tmp_path):
     locked = tmp_path / "locked"
     locked.mkdir(mode=0o500)
 
@@ -240,9 +239,7 @@ def test_directory_without_permission_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [errno.EACCES, errno.EROFS, errno.ENAMETOOLONG])
-def test_directory_that_cannot_be_made_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
-) -> None:
+def test_directory_that_cannot_be_made_is_refused(tmp_path, monkeypatch, number):
     def refuse(*_: Any) -> None:
         raise OSError(number, os.strerror(number))
 
@@ -253,7 +250,7 @@ def test_directory_that_cannot_be_made_is_refused(
     assert [] == names_in(tmp_path)
 
 
-def test_disk_full_at_open_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_disk_full_at_open_leaves_nothing(tmp_path, monkeypatch):
     def refuse(_: Manifest, directory: Path) -> None:
         (directory / "manifest.json.partial").write_text("half")
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -266,7 +263,7 @@ def test_disk_full_at_open_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     assert [] == names_in(tmp_path / "run")
 
 
-def test_disk_full_marks_the_run_as_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_disk_full_marks_the_run_as_failed(tmp_path, monkeypatch):
     def refuse(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -287,7 +284,7 @@ def test_disk_full_marks_the_run_as_failed(tmp_path: Path, monkeypatch: pytest.M
 
 
 @pytest.fixture
-def tiny_disk(tmp_path: Path) -> Iterator[Path]:
+def tiny_disk(tmp_path):
     """A file system of 1 MiB."""
     disk = tmp_path / "disk"
     disk.mkdir()
@@ -300,7 +297,7 @@ def tiny_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(disk)], check=True)
 
 
-def test_disk_really_full(tiny_disk: Path) -> None:
+def test_disk_really_full(tiny_disk):
     store = opened(tiny_disk / "run", NOISE, flush_rows=10_000)
     noise = np.random.default_rng(0).random(200_000)
 
@@ -313,9 +310,7 @@ def test_disk_really_full(tiny_disk: Path) -> None:
     assert any("the disk is full" in note for note in run.notes)
 
 
-def test_disk_full_at_the_manifest_leaves_whole_tables(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_disk_full_at_the_manifest_leaves_whole_tables(tmp_path, monkeypatch):
     def refuse(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -330,7 +325,7 @@ def test_disk_full_at_the_manifest_leaves_whole_tables(
     assert [1] == run.arrow("poses")["step"].to_pylist()
 
 
-def test_abandoned_run_is_readable(tmp_path: Path) -> None:
+def test_abandoned_run_is_readable(tmp_path):
     store = opened(tmp_path / "run", EVERY_KIND, flush_rows=64)
     rows = rows_of_every_kind(300)
     store.append("every_kind", **part(rows, 0, 130))
@@ -343,9 +338,7 @@ def test_abandoned_run_is_readable(tmp_path: Path) -> None:
     assert any("interrupted" in note for note in run.notes)
 
 
-def test_words_of_an_interrupted_append_are_not_part_of_the_digest(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_words_of_an_interrupted_append_are_not_part_of_the_digest(tmp_path, monkeypatch):
     """The digest counted a word that no row has, so that `verify` found the table changed."""
 
     def interrupt(*_: object, **__: object) -> None:
@@ -364,7 +357,7 @@ def test_words_of_an_interrupted_append_are_not_part_of_the_digest(
     assert [] == open_run(tmp_path / "run").verify()
 
 
-def test_close_after_an_interrupted_close(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_close_after_an_interrupted_close(tmp_path, monkeypatch):
     """Ctrl-C may come while the files are being finished."""
     store = opened(tmp_path / "run", POSES, NOISE)
     store.append("poses", step=1, x=0.5)
@@ -382,7 +375,7 @@ def test_close_after_an_interrupted_close(tmp_path: Path, monkeypatch: pytest.Mo
     assert [] == open_run(tmp_path / "run").verify()
 
 
-def test_close_again_gives_the_same(tmp_path: Path) -> None:
+def test_close_again_gives_the_same(tmp_path):
     store = opened(tmp_path / "run")
     store.append("poses", step=1, x=0.5)
     digests = store.close_tables()
@@ -421,7 +414,7 @@ sys.stdin.read()
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="kill -9 is a matter of POSIX")
-def test_crash_never_leaves_a_file_that_looks_whole(tmp_path: Path) -> None:
+def test_crash_never_leaves_a_file_that_looks_whole(tmp_path):
     """Killed in the middle of storing, of closing, and just after.
 
     The child waits for its end in the first case and in the last, whatever the machine is doing;
@@ -456,7 +449,7 @@ def test_crash_never_leaves_a_file_that_looks_whole(tmp_path: Path) -> None:
     assert {"running", "complete"} == seen
 
 
-def test_arrow_mid_run_shows_all_rows_and_keeps_the_digest() -> None:
+def test_arrow_mid_run_shows_all_rows_and_keeps_the_digest():
     store = opened(None, EVERY_KIND)
     rows = rows_of_every_kind(300)
     for start in range(0, 300, 100):
@@ -467,9 +460,7 @@ def test_arrow_mid_run_shows_all_rows_and_keeps_the_digest() -> None:
     assert stored(rows).manifest.digest == store.manifest.digest
 
 
-def test_relative_directory_stays_where_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_relative_directory_stays_where_it_was(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     store = opened(Path("run"))
     (tmp_path / "elsewhere").mkdir()

@@ -20,36 +20,34 @@ from .tables import EVERY_KIND, rows_of_every_kind
         (("x", "float32"), "unknown kind 'float32'"),
     ],
 )
-def test_column_without_name_or_of_unknown_kind_is_refused(
-    arguments: tuple[str, str], message: str
-) -> None:
+def test_column_without_name_or_of_unknown_kind_is_refused(arguments, message):
     with pytest.raises(ArtifactError, match=message):
         Column(*arguments)  # type: ignore[arg-type]
 
 
-def test_column_refuses_categories_of_another_kind() -> None:
+def test_column_refuses_categories_of_another_kind():
     with pytest.raises(ArtifactError, match="kind must be category"):
         Column("x", "int32", categories=("a",))
 
 
-def test_column_refuses_a_category_named_twice() -> None:
+def test_column_refuses_a_category_named_twice():
     with pytest.raises(ArtifactError, match="twice"):
         Column("x", "category", categories=("a", "a"))
 
 
 @pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden"])
-def test_table_refuses_a_name_that_is_no_file_name(name: str) -> None:
+def test_table_refuses_a_name_that_is_no_file_name(name):
     with pytest.raises(ArtifactError, match="can't be named"):
         TableSpec(name, (Column("step", "step"),))
 
 
 @pytest.mark.parametrize("columns", [(), (Column("a", "int32"), Column("a", "bool"))])
-def test_table_refuses_no_columns_and_double_ones(columns: tuple[Column, ...]) -> None:
+def test_table_refuses_no_columns_and_double_ones(columns):
     with pytest.raises(ArtifactError, match=r"no columns|twice"):
         TableSpec("t", columns)
 
 
-def test_schema_carries_the_whole_spec() -> None:
+def test_schema_carries_the_whole_spec():
     schema = schema_of(EVERY_KIND)
 
     assert spec_of(schema) == EVERY_KIND
@@ -68,7 +66,7 @@ def append(buffer: TableBuffer, **columns: Any) -> None:
     buffer.fill(buffer.check(columns), 0)
 
 
-def test_append_copies_its_arguments() -> None:
+def test_append_copies_its_arguments():
     buffer = TableBuffer(POSES)
     step = np.arange(3)
 
@@ -78,7 +76,7 @@ def test_append_copies_its_arguments() -> None:
     assert [0, 1, 2] == buffer.take()["step"].values.tolist()
 
 
-def test_append_repeats_scalars() -> None:
+def test_append_repeats_scalars():
     buffer = TableBuffer(POSES)
 
     append(buffer, step=np.arange(3), x=0.5)
@@ -97,7 +95,7 @@ def test_append_repeats_scalars() -> None:
         (Column("c", "bool"), np.array([True, False, True])),
     ],
 )
-def test_repeated_values_are_stored_as_each_row_has_them(column: Column, values: Any) -> None:
+def test_repeated_values_are_stored_as_each_row_has_them(column, values):
     index = np.array([0, 0, 2, 1, 1, 1, 2])
     once, each = (TableBuffer(TableSpec("t", (column,)), limit=4) for _ in range(2))
     batches = once.check({"c": Repeated(values, index)}), each.check({"c": values[index]})
@@ -109,7 +107,7 @@ def test_repeated_values_are_stored_as_each_row_has_them(column: Column, values:
             assert np.array_equal(some, others)
 
 
-def test_append_of_all_scalars_to_strings_adds_one_row() -> None:
+def test_append_of_all_scalars_to_strings_adds_one_row():
     buffer = of(Column("a", "string", nullable=True), Column("b", "category"))
 
     append(buffer, a=None, b="on")
@@ -120,7 +118,7 @@ def test_append_of_all_scalars_to_strings_adds_one_row() -> None:
     assert [False] == chunk["a"].valid.tolist()
 
 
-def test_many_small_appends_grow_the_buffer() -> None:
+def test_many_small_appends_grow_the_buffer():
     buffer = TableBuffer(POSES)
 
     for step in range(1000):
@@ -131,7 +129,7 @@ def test_many_small_appends_grow_the_buffer() -> None:
     assert [step / 2 for step in range(1000)] == chunk["x"].values.tolist()
 
 
-def test_fill_stops_at_the_limit_and_says_where() -> None:
+def test_fill_stops_at_the_limit_and_says_where():
     buffer = TableBuffer(POSES, limit=4)
     batch = buffer.check({"step": np.arange(6), "x": np.zeros(6)})
 
@@ -142,7 +140,7 @@ def test_fill_stops_at_the_limit_and_says_where() -> None:
     assert [4, 5] == buffer.take()["step"].values.tolist()
 
 
-def test_deepcopy_shares_nothing() -> None:
+def test_deepcopy_shares_nothing():
     buffer = TableBuffer(EVERY_KIND)
     append(buffer, **rows_of_every_kind(20))
     twin = deepcopy(buffer)
@@ -173,7 +171,7 @@ def test_deepcopy_shares_nothing() -> None:
         ({"step": np.arange(3), "x": Repeated(np.zeros(1), np.zeros(2, int))}, "has 2 values"),
     ],
 )
-def test_append_refuses_columns_that_do_not_fit(columns: dict[str, Any], message: str) -> None:
+def test_append_refuses_columns_that_do_not_fit(columns, message):
     buffer = TableBuffer(POSES)
 
     with pytest.raises(ArtifactError, match=message):
@@ -198,12 +196,12 @@ def test_append_refuses_columns_that_do_not_fit(columns: dict[str, Any], message
         (Column("c", "int64"), np.ma.masked_array([1, 2], [True, False]), "declare it nullable"),
     ],
 )
-def test_append_refuses_values_that_do_not_fit(column: Column, values: Any, message: str) -> None:
+def test_append_refuses_values_that_do_not_fit(column, values, message):
     with pytest.raises(ArtifactError, match=f"table 't', column 'c': .*{message}"):
         append(of(column), c=values)
 
 
-def test_times_may_be_datetimes_or_microseconds() -> None:
+def test_times_may_be_datetimes_or_microseconds():
     buffer = of(Column("time", "time"))
 
     append(buffer, time=np.array(["1970-01-01T00:00:01"], "M8[s]"))
@@ -212,7 +210,7 @@ def test_times_may_be_datetimes_or_microseconds() -> None:
     assert [1_000_000, 2_000_000] == buffer.take()["time"].values.tolist()
 
 
-def test_integers_of_any_width_fit_where_their_values_do() -> None:
+def test_integers_of_any_width_fit_where_their_values_do():
     buffer = of(Column("c", "int32"))
 
     append(buffer, c=np.array([2**31 - 1], np.int64))

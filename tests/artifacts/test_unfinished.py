@@ -63,7 +63,7 @@ def commit_rows(store: RunStore, commits: int) -> list[Any]:
     return ends
 
 
-def test_a_journal_that_begins_again_describes_its_tables_again(tmp_path: Path) -> None:
+def test_a_journal_that_begins_again_describes_its_tables_again(tmp_path):
     unfinished = UnfinishedRun(tmp_path)
     for rows in (3, 2):
         unfinished.begin()
@@ -83,7 +83,7 @@ def kill(store: RunStore) -> Path:
     return store.directory
 
 
-def test_times_without_steps_are_stored_by_themselves(tmp_path: Path) -> None:
+def test_times_without_steps_are_stored_by_themselves(tmp_path):
     """The column of times may come first, or have missing values."""
     steps = np.arange(1000, dtype=np.int64)
     times = np.datetime64("2026-01-05T00:00", "us") + steps * 1_000_000
@@ -105,7 +105,7 @@ def test_times_without_steps_are_stored_by_themselves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("flush_rows", [30, 250, 2**17])
-def test_a_killed_run_reads_up_to_its_last_commit(tmp_path: Path, flush_rows: int) -> None:
+def test_a_killed_run_reads_up_to_its_last_commit(tmp_path, flush_rows):
     store = begin_run(tmp_path / "run", flush_rows=flush_rows)
     store.append("every_kind", **part(ROWS, 0, 50))
     run = open_run(kill(store))
@@ -124,7 +124,7 @@ def test_a_killed_run_reads_up_to_its_last_commit(tmp_path: Path, flush_rows: in
 
 @pytest.mark.parametrize("flush_rows", [30, 250, 2**17])
 @pytest.mark.parametrize("undone", [0, 2])
-def test_a_store_goes_on_behind_a_commit(tmp_path: Path, flush_rows: int, undone: int) -> None:
+def test_a_store_goes_on_behind_a_commit(tmp_path, flush_rows, undone):
     expected = begin_run(None, flush_rows=flush_rows).close()  # type: ignore[arg-type]
     store = RunStore(tmp_path / "run", [EVERY_KIND], flush_rows=flush_rows)
     store.open()
@@ -144,7 +144,7 @@ def test_a_store_goes_on_behind_a_commit(tmp_path: Path, flush_rows: int, undone
     assert {"manifest.json", "every_kind.parquet", "late.parquet"} == names
 
 
-def test_a_cut_or_damaged_journal_reads_up_to_the_last_whole_commit(tmp_path: Path) -> None:
+def test_a_cut_or_damaged_journal_reads_up_to_the_last_whole_commit(tmp_path):
     """What a power cut leaves: the file ends anywhere, or holds anything behind what was synced."""
     directory = kill(begin_run(tmp_path / "run"))
     path = directory / FOLDER / JOURNAL_NAME
@@ -194,7 +194,7 @@ def put_into(value: Any, rng: random.Random) -> Any:
     return rng.choice([None, -1, 0, 2**62, 1e300, "x", [], {}, True, [1], 10**30, "every_kind"])
 
 
-def test_forged_frames_read_or_are_refused(tmp_path: Path) -> None:
+def test_forged_frames_read_or_are_refused(tmp_path):
     """Right checksums around wrong content: codes beyond the words, a text cut inside a letter,
     two tables of one name, a time after the year 9999."""
     directory = kill(begin_run(tmp_path / "run"))
@@ -273,9 +273,7 @@ def moved_border(text: Any) -> Any:
         ("said", moved_border, "can't decode byte"),
     ],
 )
-def test_rows_that_no_run_stores_are_refused(
-    tmp_path: Path, name: str, change: Callable[[Any], Any], words: str
-) -> None:
+def test_rows_that_no_run_stores_are_refused(tmp_path, name, change, words):
     directory = kill(begin_run(tmp_path / "run"))
     path = directory / FOLDER / JOURNAL_NAME
 
@@ -289,7 +287,7 @@ def test_rows_that_no_run_stores_are_refused(
         open_run(directory).arrow("every_kind")
 
 
-def test_two_tables_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_two_tables_of_one_name_are_refused(tmp_path):
     directory = kill(begin_run(tmp_path / "run"))
     path = directory / FOLDER / JOURNAL_NAME
 
@@ -306,7 +304,7 @@ def test_two_tables_of_one_name_are_refused(tmp_path: Path) -> None:
         open_run(directory).arrow("every_kind")
 
 
-def test_a_flipped_byte_ends_the_journal_before_it(tmp_path: Path) -> None:
+def test_a_flipped_byte_ends_the_journal_before_it(tmp_path):
     directory = kill(begin_run(tmp_path / "run"))
     path = directory / FOLDER / JOURNAL_NAME
     content = path.read_bytes()
@@ -316,13 +314,13 @@ def test_a_flipped_byte_ends_the_journal_before_it(tmp_path: Path) -> None:
         assert commit is None or commit.end <= at
 
 
-def test_what_is_no_journal_has_no_commit(tmp_path: Path) -> None:
+def test_what_is_no_journal_has_no_commit(tmp_path):
     assert last_commit(tmp_path / "nothing") is None
     (tmp_path / "text").write_text("hello")
     assert last_commit(tmp_path / "text") is None
 
 
-def test_one_run_has_one_writer(tmp_path: Path) -> None:
+def test_one_run_has_one_writer(tmp_path):
     store = begin_run(tmp_path / "run")
     with pytest.raises(RunDirectoryError, match=f"being written by process {os.getpid()} on"):
         UnfinishedRun(tmp_path / "run").lock()
@@ -330,14 +328,12 @@ def test_one_run_has_one_writer(tmp_path: Path) -> None:
     UnfinishedRun(tmp_path / "run").lock()
 
 
-def test_a_run_in_memory_commits_nothing() -> None:
+def test_a_run_in_memory_commits_nothing():
     store = RunStore(None, [EVERY_KIND])
     assert store.commit(3) is None
 
 
-def test_a_full_disk_keeps_what_was_committed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_keeps_what_was_committed(tmp_path, monkeypatch):
     store = begin_run(tmp_path / "run", commits=3)
     store.append("every_kind", **part(ROWS, 300, 400))
 
@@ -354,9 +350,7 @@ def test_a_full_disk_keeps_what_was_committed(
 
 
 @pytest.mark.parametrize("status", ["complete", "interrupted"])
-def test_a_disk_that_fails_when_the_journal_is_closed_ends_no_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: Any
-) -> None:
+def test_a_disk_that_fails_when_the_journal_is_closed_ends_no_run(tmp_path, monkeypatch, status):
     """Network file systems report late that they are full; nothing of the journal is needed."""
     store = begin_run(tmp_path / "run")
     close = os.close
@@ -380,14 +374,14 @@ def frame(encoding: int, count: int, content: bytes) -> bytes:
     return HEADER.pack(encoding, count, len(content)) + content
 
 
-def test_few_bytes_can_not_ask_for_all_memory() -> None:
+def test_few_bytes_can_not_ask_for_all_memory():
     content = frame(RUNS, 1, bytes(8) + b"\xff" * 4)
     with pytest.raises(ValueError, match="don't make"):
         ArrayReader(content).read(INT64, 1000)
 
 
 @pytest.mark.parametrize("encoding", [NARROW, GROWTH, RUNS, LINE])
-def test_text_is_never_repeated(encoding: int) -> None:
+def test_text_is_never_repeated(encoding):
     """The length of a text isn't bounded as that of other columns is: it must be there."""
     with pytest.raises(ValueError, match="text has encoding"):
         ArrayReader(frame(encoding, 1, b"a" + bytes(7) + b"\1")).read(np.dtype(np.uint8), 2**56)
@@ -415,11 +409,11 @@ def test_text_is_never_repeated(encoding: int) -> None:
         frame(9, 0, bytes(24)),
     ],
 )
-def test_what_encodes_nothing_is_refused(content: bytes) -> None:
+def test_what_encodes_nothing_is_refused(content):
     with pytest.raises(ValueError):  # noqa: PT011 - some messages are numpy's
         ArrayReader(content).read(INT64, 3)
 
 
-def test_flags_are_true_or_false() -> None:
+def test_flags_are_true_or_false():
     with pytest.raises(ValueError, match="neither"):
         ArrayReader(frame(RAW, 0, b"\1\0\2")).read(np.dtype(np.bool_), 3)

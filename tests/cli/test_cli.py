@@ -15,7 +15,7 @@ import jsonschema
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from tests.scenes import Cli, every_step, everything, flat_path, fleet2d_process, scenario
+from tests.scenes import every_step, everything, flat_path, fleet2d_process, scenario
 
 import fleet2d as package
 from fleet2d.cli import main
@@ -50,7 +50,7 @@ def small(**sections: Any) -> dict[str, Any]:
 # --- run ---------------------------------------------------------------------------------------
 
 
-def test_json_is_exactly_one_object_with_the_documented_keys(fleet2d: Cli) -> None:
+def test_json_is_exactly_one_object_with_the_documented_keys(fleet2d):
     code, out, err = fleet2d("run", written(small()), "--out", "run", "--json")
     assert (0, 1) == (code, out.count("\n"))
     summary = json.loads(out)
@@ -71,7 +71,7 @@ def test_json_is_exactly_one_object_with_the_documented_keys(fleet2d: Cli) -> No
     assert "Traceback" not in err
 
 
-def test_a_summary_for_people_names_what_matters(fleet2d: Cli) -> None:
+def test_a_summary_for_people_names_what_matters(fleet2d):
     code, out, _ = fleet2d("run", written(small()), "--out", "run")
     stored = package.open_run("run")
     assert 0 == code
@@ -89,7 +89,7 @@ def test_a_summary_for_people_names_what_matters(fleet2d: Cli) -> None:
         json.loads(out)
 
 
-def test_the_table_shows_what_matters_of_many_numbers_and_json_all(fleet2d: Cli) -> None:
+def test_the_table_shows_what_matters_of_many_numbers_and_json_all(fleet2d):
     content = small(algorithms={"rtp": {"type": "real_time_presence"}})
     content["metrics"] = {
         "rtp_score": {"of": "rtp", "period": "5 min"},
@@ -110,23 +110,23 @@ def test_the_table_shows_what_matters_of_many_numbers_and_json_all(fleet2d: Cli)
     assert everything == json.loads(out)["metrics"]
 
 
-def test_the_table_hides_nothing_of_few_numbers(fleet2d: Cli) -> None:
+def test_the_table_hides_nothing_of_few_numbers(fleet2d):
     _, out, _ = fleet2d("run", written(small()), "--out", "run")
     assert "more numbers" not in out
 
 
-def test_quiet_prints_nothing(fleet2d: Cli) -> None:
+def test_quiet_prints_nothing(fleet2d):
     assert (0, "", "") == fleet2d("run", written(small()), "--out", "run", "--quiet")
     assert "complete" == package.open_run("run").status
 
 
-def test_quiet_with_json_prints_the_object_alone(fleet2d: Cli) -> None:
+def test_quiet_with_json_prints_the_object_alone(fleet2d):
     code, out, err = fleet2d("run", written(small()), "--out", "run", "--quiet", "--json")
     assert (0, "") == (code, err)
     assert Path("run").resolve() == Path(json.loads(out)["run_dir"]).resolve()
 
 
-def test_without_out_runs_are_numbered_by_the_name_of_their_scenario(fleet2d: Cli) -> None:
+def test_without_out_runs_are_numbered_by_the_name_of_their_scenario(fleet2d):
     scenario_file = written(small())
     named = written(small() | {"name": "quiet_week"}, "other.yaml")
     for file in (scenario_file, scenario_file, named):
@@ -138,7 +138,7 @@ def test_without_out_runs_are_numbered_by_the_name_of_their_scenario(fleet2d: Cl
     assert ["home-001", "home-002", "home-003", "home-005", "quiet_week-001"] == names
 
 
-def test_without_a_scenario_the_family_runs_changed_as_told(fleet2d: Cli) -> None:
+def test_without_a_scenario_the_family_runs_changed_as_told(fleet2d):
     arguments = [
         "simulation.duration.days=1",
         "metrics.ltp_error=null",
@@ -158,7 +158,7 @@ def test_without_a_scenario_the_family_runs_changed_as_told(fleet2d: Cli) -> Non
     assert "sightings" in run.metrics
 
 
-def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d: Cli) -> None:
+def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d):
     scenario_file = written(small())
     digests = []
     for number, arguments in enumerate((["--seed", "9"], ["simulation.seed=9"], ["--seed", "0"])):
@@ -169,7 +169,7 @@ def test_seed_wins_over_the_scenario_and_decides_the_run(fleet2d: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_any_plan_goes_under_the_base_scenario(fleet2d: Cli, shared_data: Path) -> None:
+def test_any_plan_goes_under_the_base_scenario(fleet2d, shared_data):
     for plan in sorted((shared_data / "houseexpo").glob("*.json"))[:6]:
         arguments = [
             "floorplan.type=houseexpo",
@@ -180,7 +180,7 @@ def test_any_plan_goes_under_the_base_scenario(fleet2d: Cli, shared_data: Path) 
         assert (0, "") == (code, err), plan.stem
 
 
-def test_progress_is_shown_on_a_terminal_only(fleet2d: Cli) -> None:
+def test_progress_is_shown_on_a_terminal_only(fleet2d):
     done = fleet2d_process("run", str(written(small())), "--out", "run", cwd=Path.cwd())
     assert 0 == done.returncode
     assert "x real time" not in done.stderr
@@ -190,7 +190,7 @@ def test_progress_is_shown_on_a_terminal_only(fleet2d: Cli) -> None:
 # --- validate, schema, components --------------------------------------------------------------
 
 
-def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
+def test_validate_says_what_would_run_and_writes_nothing(fleet2d):
     code, out, err = fleet2d("validate", written(small()), "simulation.step=2 s")
     assert (2, "") == (code, err)
     assert "\nwrong: a body of radius 0.15 m can't get to storage_1" in out
@@ -200,7 +200,7 @@ def test_validate_says_what_would_run_and_writes_nothing(fleet2d: Cli) -> None:
     assert 0 == fleet2d("validate", "bundled:paper")[0]
 
 
-def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d: Cli) -> None:
+def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d):
     file = written(small())
     code, out, err = fleet2d("run", file, "--out", "run")
     wrong = "wrong: a body of radius 0.15 m can't get to storage_1 (4.0 m2)"
@@ -213,21 +213,21 @@ def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d: Cli
 
 
 @pytest.fixture(scope="module")
-def schema() -> dict[str, Any]:
+def schema():
     from fleet2d.scenario.schema import schema as scenario_schema
 
     return scenario_schema()
 
 
 @pytest.mark.slow
-def test_the_schema_is_valid_and_says_which_it_is(fleet2d: Cli, schema: dict[str, Any]) -> None:
+def test_the_schema_is_valid_and_says_which_it_is(fleet2d, schema):
     code, out, err = fleet2d("components", "--schema", "scenario")
     assert (0, "", schema) == (code, err, json.loads(out))
     jsonschema.validators.validator_for(schema).check_schema(schema)
     assert schema["$schema"].startswith("https://json-schema.org/")
 
 
-def test_the_base_scenario_and_ours_fit_the_schema(schema: dict[str, Any]) -> None:
+def test_the_base_scenario_and_ours_fit_the_schema(schema):
     validator = jsonschema.validators.validator_for(schema)(schema)
     base = read_document(bundled_path("paper")).data
     for content in (base, small(), everything()):
@@ -253,15 +253,13 @@ def test_the_base_scenario_and_ours_fit_the_schema(schema: dict[str, Any]) -> No
         },
     ],
 )
-def test_what_is_wrong_does_not_fit_the_schema(
-    schema: dict[str, Any], wrong: dict[str, Any]
-) -> None:
+def test_what_is_wrong_does_not_fit_the_schema(schema, wrong):
     validator = jsonschema.validators.validator_for(schema)(schema)
     assert list(validator.iter_errors(small() | wrong))
 
 
 @pytest.mark.slow
-def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
+def test_components_lists_every_type_with_its_fields(fleet2d):
     code, out, _ = fleet2d("components")
     assert 0 == code
     for kind in COMPONENTS:
@@ -275,7 +273,7 @@ def test_components_lists_every_type_with_its_fields(fleet2d: Cli) -> None:
         assert word in out
 
 
-def test_components_as_json_are_a_list(fleet2d: Cli) -> None:
+def test_components_as_json_are_a_list(fleet2d):
     code, out, _ = fleet2d("components", "--json")
     assert 0 == code
     listed = {(entry["kind"], entry["type"]) for entry in json.loads(out)}
@@ -288,7 +286,7 @@ def test_components_as_json_are_a_list(fleet2d: Cli) -> None:
 # --- show --------------------------------------------------------------------------------------
 
 
-def test_show_draws_a_plan_and_says_where(fleet2d: Cli) -> None:
+def test_show_draws_a_plan_and_says_where(fleet2d):
     assert (0, "flat.png\n") == fleet2d("show", flat_path())[:2]
     assert Path("flat.png").read_bytes().startswith(PNG)
     assert (0, "home.svg\n") == fleet2d("show", flat_path(), "--out", "home.svg")[:2]
@@ -298,13 +296,13 @@ def test_show_draws_a_plan_and_says_where(fleet2d: Cli) -> None:
     assert 2 == len(list(Path().iterdir()))
 
 
-def test_show_without_a_plan_draws_the_bundled_home(fleet2d: Cli) -> None:
+def test_show_without_a_plan_draws_the_bundled_home(fleet2d):
     assert (0, "family_home.png\n") == fleet2d("show")[:2]
     assert Path("family_home.png").read_bytes().startswith(PNG)
 
 
 @pytest.mark.slow
-def test_show_draws_a_run_in_its_home(fleet2d: Cli) -> None:
+def test_show_draws_a_run_in_its_home(fleet2d):
     assert 0 == fleet2d("run", written(small()), "--out", "run", "--quiet")[0]
     code, out, err = fleet2d("show", "run")
     assert (0, "") == (code, err)
@@ -327,9 +325,7 @@ def without_matplotlib(folder: Path, *arguments: str) -> subprocess.CompletedPro
 
 
 @pytest.mark.parametrize("command", [["show"], ["show", "--checkup"]])
-def test_picture_without_matplotlib_says_what_to_install(
-    tmp_path: Path, command: list[str]
-) -> None:
+def test_picture_without_matplotlib_says_what_to_install(tmp_path, command):
     done = without_matplotlib(tmp_path, *command, "--out", str(tmp_path / "x.png"))
 
     assert done.returncode in (1, 2), done.stderr
@@ -338,16 +334,14 @@ def test_picture_without_matplotlib_says_what_to_install(
         assert word in done.stderr
 
 
-def test_validate_checks_a_floor_plan_without_matplotlib(tmp_path: Path) -> None:
+def test_validate_checks_a_floor_plan_without_matplotlib(tmp_path):
     done = without_matplotlib(tmp_path, "validate", "family_home")
 
     assert 0 == done.returncode, done.stderr
     assert "ok: nothing wrong" in done.stdout
 
 
-def test_run_and_validate_say_what_is_wrong_with_a_home_from_a_file(
-    fleet2d: Cli, tmp_path: Path
-) -> None:
+def test_run_and_validate_say_what_is_wrong_with_a_home_from_a_file(fleet2d, tmp_path):
     plan = {
         "format": "fleet2d-floorplan",
         "version": 1,
@@ -373,14 +367,14 @@ def test_run_and_validate_say_what_is_wrong_with_a_home_from_a_file(
 # --- reproduce ---------------------------------------------------------------------------------
 
 
-def test_reproduce_says_reproduced(fleet2d: Cli) -> None:
+def test_reproduce_says_reproduced(fleet2d):
     assert 0 == fleet2d("run", written(everything("5 min")), "--out", "run", "--quiet")[0]
     code, out, err = fleet2d("verify", "run", "--again")
     assert (0, "") == (code, err)
     assert f"reproduced: digest {package.open_run('run').digest}" in out
 
 
-def test_reproduce_fails_on_a_table_that_was_tampered_with(fleet2d: Cli) -> None:
+def test_reproduce_fails_on_a_table_that_was_tampered_with(fleet2d):
     assert 0 == fleet2d("run", written(small()), "--out", "run", "--quiet")[0]
     file = Path("run/trajectories.parquet")
     rows = pq.read_table(file)
@@ -394,7 +388,7 @@ def test_reproduce_fails_on_a_table_that_was_tampered_with(fleet2d: Cli) -> None
     assert "trajectories" in err
 
 
-def test_reproduce_fails_on_a_manifest_that_was_tampered_with(fleet2d: Cli) -> None:
+def test_reproduce_fails_on_a_manifest_that_was_tampered_with(fleet2d):
     assert 0 == fleet2d("run", written(small()), "--out", "run", "--quiet")[0]
     file = Path("run/manifest.json")
     manifest = json.loads(file.read_text())
@@ -426,7 +420,7 @@ def interrupted(
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals are posix")
-def test_ctrl_c_leaves_a_readable_run(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_a_readable_run(tmp_path):
     (tmp_path / "home.yaml").write_text(yaml.safe_dump(every_step("300 d")))
     journal = tmp_path / "run" / "unfinished" / "journal"
 
@@ -448,9 +442,7 @@ def test_ctrl_c_leaves_a_readable_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["run", "validate"])
-def test_ctrl_c_during_set_up_exits_130(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, command: str
-) -> None:
+def test_ctrl_c_during_set_up_exits_130(fleet2d, monkeypatch, command):
     def interrupt(*args: object, **kwargs: object) -> None:
         raise KeyboardInterrupt
 
@@ -488,9 +480,7 @@ USED = {
 }  # fmt: skip
 
 
-def test_file_that_can_not_be_written_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_file_that_can_not_be_written_is_one_line(monkeypatch, capsys, tmp_path):
     def fail(**_: object) -> None:
         (tmp_path / "missing" / "table.csv").write_text("")
 
@@ -505,7 +495,7 @@ def test_file_that_can_not_be_written_is_one_line(
 
 
 @pytest.mark.slow
-def test_run_imports_only_what_its_scenario_needs(tmp_path: Path) -> None:
+def test_run_imports_only_what_its_scenario_needs(tmp_path):
     script = """
 import json, sys
 from fleet2d.cli import main
@@ -531,7 +521,7 @@ except SystemExit:
 
 
 @pytest.mark.slow
-def test_modules_are_imported_with_few_collections_of_garbage(tmp_path: Path) -> None:
+def test_modules_are_imported_with_few_collections_of_garbage(tmp_path):
     """They were a tenth of the time until the first step."""
     script = """
 import gc, sys
@@ -556,7 +546,7 @@ except SystemExit:
     assert (middle < 3, old) == (True, 0)
 
 
-def test_importing_does_not_load_the_compiler() -> None:
+def test_importing_does_not_load_the_compiler():
     script = "import sys, fleet2d, fleet2d.cli; print(sorted({'numba', 'pyarrow', 'shapely', 'matplotlib'} & set(sys.modules)))"
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True,

@@ -6,11 +6,10 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
-from pathlib import Path
 
 import pytest
 import typer
-from tests.scenes import Cli, process
+from tests.scenes import process
 
 from fleet2d import __version__
 from fleet2d.cli import __main__ as commands
@@ -28,7 +27,7 @@ finally:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_module_of_a_command_has_its_function(command: str, fleet2d: Cli) -> None:
+def test_module_of_a_command_has_its_function(command, fleet2d):
     code, out, err = fleet2d(command, "--help")
 
     assert (0, "") == (code, err)
@@ -56,7 +55,7 @@ def described(help_text: str) -> dict[str, list[str]]:
     return sections
 
 
-def test_help_lists_the_commands_in_groups_the_most_used_first(fleet2d: Cli) -> None:
+def test_help_lists_the_commands_in_groups_the_most_used_first(fleet2d):
     _, out, _ = fleet2d("--help")
 
     sections = described(out)
@@ -67,9 +66,7 @@ def test_help_lists_the_commands_in_groups_the_most_used_first(fleet2d: Cli) -> 
 
 
 @pytest.mark.parametrize("words", [(), ("study",), ("fit",), ("dataset",)])
-def test_no_description_of_a_command_is_cut_or_wrapped(
-    words: tuple[str, ...], fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_description_of_a_command_is_cut_or_wrapped(words, fleet2d, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     _, out, _ = fleet2d(*words, "--help")
 
@@ -82,9 +79,7 @@ def test_no_description_of_a_command_is_cut_or_wrapped(
             assert len(description) <= 58, name
 
 
-def test_descriptions_are_wrapped_in_a_narrow_terminal(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_descriptions_are_wrapped_in_a_narrow_terminal(fleet2d, monkeypatch):
     monkeypatch.setenv("COLUMNS", "50")
     _, out, _ = fleet2d("--help")
 
@@ -95,9 +90,7 @@ def test_descriptions_are_wrapped_in_a_narrow_terminal(
 
 
 @pytest.mark.parametrize("words", list(all_commands()), ids=" ".join)
-def test_help_of_each_command_ends_in_examples_that_are_valid(
-    words: tuple[str, ...], fleet2d: Cli
-) -> None:
+def test_help_of_each_command_ends_in_examples_that_are_valid(words, fleet2d):
     code, out, _ = fleet2d(*words, "--help")
 
     assert 0 == code
@@ -122,18 +115,14 @@ def parse(arguments: list[str]) -> None:
 
 
 @pytest.mark.parametrize("words", list(all_commands()), ids=" ".join)
-def test_help_names_what_a_command_takes_once_and_without_types_of_python(
-    words: tuple[str, ...], fleet2d: Cli
-) -> None:
+def test_help_names_what_a_command_takes_once_and_without_types_of_python(words, fleet2d):
     _, out, _ = fleet2d(*words, "--help")
 
     assert [] == re.findall(r"<list\[.*|\[\[.*|\{[a-z]+\}", out)
     assert "<" not in " ".join(described(out).get("Arguments", ()))
 
 
-def test_command_of_an_installed_package_is_listed_below_the_own(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_command_of_an_installed_package_is_listed_below_the_own(fleet2d, monkeypatch):
     entry = EntryPoint("dust", "tests.own_components:dust", "fleet2d.command")
     monkeypatch.setattr(commands, "entries", lambda: iter([entry]))
     monkeypatch.setattr(EntryPoint, "load", lambda self: dust)
@@ -147,28 +136,28 @@ def dust() -> None:
     """Sweep."""
 
 
-def test_python_runs_the_command_line() -> None:
+def test_python_runs_the_command_line():
     done = process("-m", "fleet2d", "--version")
 
     assert (0, f"fleet2d {__version__}\n") == (done.returncode, done.stdout)
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("exprt", "export"), ("stdy", "study")])
-def test_nearest_command_is_named(typed: str, meant: str, fleet2d: Cli) -> None:
+def test_nearest_command_is_named(typed, meant, fleet2d):
     code, _, err = fleet2d(typed)
 
     assert 2 == code
     assert f"No such command '{typed}': did you mean '{meant}'?" in err
 
 
-def test_command_that_is_like_no_other_is_refused(fleet2d: Cli) -> None:
+def test_command_that_is_like_no_other_is_refused(fleet2d):
     code, _, err = fleet2d("frobnicate")
 
     assert 2 == code
     assert "No such command 'frobnicate'.\n" in err
 
 
-def test_command_imports_no_other() -> None:
+def test_command_imports_no_other():
     done = subprocess.run(
         [sys.executable, "-c", OTHERS], capture_output=True, text=True, check=True
     )
@@ -176,9 +165,7 @@ def test_command_imports_no_other() -> None:
     assert "fleet2d.cli.results fleet2d.cli.run" == done.stdout.splitlines()[-1]
 
 
-def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(fleet2d, monkeypatch):
     words = ("bundled:family", "simulation.duration=3 h", "simulation.start=2026-01-05T17:00")
     tables = []
     for columns in ("20", "200"):
@@ -190,9 +177,7 @@ def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(
     assert narrow == wide
 
 
-def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(fleet2d, monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     _, out, _ = fleet2d("run", "bundled:paper", "simulation.duration=1 d", "--out", "run")
 
@@ -202,9 +187,7 @@ def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(
 @pytest.mark.parametrize(
     ("typed", "meant"), [("runs/frist", "runs/first"), ("hom.yaml", "home.yaml")]
 )
-def test_what_cannot_be_viewed_names_what_is_nearest(
-    typed: str, meant: str, tmp_path: Path, fleet2d: Cli
-) -> None:
+def test_what_cannot_be_viewed_names_what_is_nearest(typed, meant, tmp_path, fleet2d):
     (tmp_path / "runs" / "first").mkdir(parents=True)
     (tmp_path / "home.yaml").touch()
 

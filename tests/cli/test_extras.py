@@ -73,7 +73,7 @@ FILES: dict[str, Any] = {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A folder with a run, a study, a data set and the files that commands need."""
     root = tmp_path_factory.mktemp("extras")
     for name, content in FILES.items():
@@ -131,9 +131,7 @@ LACKING = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("command", "hidden", "extra"), LACKING)
-def test_a_command_says_in_one_line_what_to_install(
-    folder: Path, command: str, hidden: str, extra: str
-) -> None:
+def test_a_command_says_in_one_line_what_to_install(folder, command, hidden, extra):
     """`view` printed a traceback of 41 lines."""
     before = sorted(folder.rglob("*"))
     done = without(folder, hidden or modules(), command)
@@ -156,14 +154,14 @@ PLAIN = (
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", some(PLAIN, 3))
-def test_a_command_that_needs_no_extra_runs_without_any(folder: Path, command: str) -> None:
+def test_a_command_that_needs_no_extra_runs_without_any(folder, command):
     """`dataset` simulated everything, and then failed as polars wasn't there."""
     done = without(folder, modules(), command)
     assert 0 == done.returncode, done.stderr
 
 
 @pytest.mark.parametrize("extra", [extra for extra in EXTRAS if extra not in TOOLS])
-def test_the_extra_of_every_module_is_known(extra: str) -> None:
+def test_the_extra_of_every_module_is_known(extra):
     for package in packages(extra):
         if package not in OTHERS:
             assert package in map(str.lower, packages(extra_with(package)))

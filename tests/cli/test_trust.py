@@ -1,9 +1,7 @@
 """No code of a stored run is run unless it is trusted; what would run is listed first."""
 
-from pathlib import Path
-
 import pytest
-from tests.scenes import Cli, fleet2d_process
+from tests.scenes import fleet2d_process
 
 OWN = """
 from pathlib import Path
@@ -18,7 +16,7 @@ class Count(fleet2d.Algorithm):
 
 
 @pytest.fixture(scope="module")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def home(tmp_path_factory):
     """A folder with a complete and an interrupted run of a scenario with code of its own."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "mine.py").write_text(OWN.format(ran=folder / "ran"))
@@ -49,9 +47,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [("verify", "run", "--again"), ("resume", "half")])
-def test_code_runs_only_when_it_is_trusted(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, home: Path, command: tuple[str, ...]
-) -> None:
+def test_code_runs_only_when_it_is_trusted(fleet2d, monkeypatch, home, command):
     monkeypatch.chdir(home)
     code, _, err = fleet2d(*command)
     assert 2 == code
@@ -65,7 +61,7 @@ def test_code_runs_only_when_it_is_trusted(
     (home / "ran").unlink()
 
 
-def test_verify_runs_nothing(fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
+def test_verify_runs_nothing(fleet2d, monkeypatch, home):
     monkeypatch.chdir(home)
     code, out, err = fleet2d("verify", "run")
     assert 0 == code, err

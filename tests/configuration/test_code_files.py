@@ -13,7 +13,7 @@ def names(folder: Path, *files: str) -> list[str]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     """A folder with `a.py`, `b.py` and the package `p` of `p.c` and `p.q.d`."""
     for name in ("a", "b", "p/__init__", "p/c", "p/q/__init__", "p/q/d"):
         path = tmp_path / f"{name}.py"
@@ -41,12 +41,12 @@ def folder(tmp_path: Path) -> Path:
         ("\0", []),
     ],
 )
-def test_each_file_beside_a_module_is_found(folder: Path, text: str, imported: list[str]) -> None:
+def test_each_file_beside_a_module_is_found(folder, text, imported):
     (folder / "a.py").write_text(text)
     assert ["a.py", *imported] == names(folder, "a.py")
 
 
-def test_files_that_import_each_other_are_found_once(folder: Path) -> None:
+def test_files_that_import_each_other_are_found_once(folder):
     (folder / "a.py").write_text("import b")
     (folder / "b.py").write_text("import a, p.q.d")
     (folder / "p/q/d.py").write_text("from .. import c")

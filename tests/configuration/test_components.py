@@ -4,9 +4,7 @@ import copy
 import pickle
 import subprocess
 import sys
-from collections.abc import Iterator
 from importlib.metadata import EntryPoint, EntryPoints
-from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import pytest
@@ -58,7 +56,7 @@ class Shelf(Settings):
 
 
 @pytest.fixture(autouse=True)
-def gadgets(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def gadgets(monkeypatch):
     names = {"lamp": Lamp, "light": Lamp, "fan": Fan}
     paths = {name: f"{__name__}:{cls.__name__}" for name, cls in names.items()}
     monkeypatch.setitem(COMPONENTS, "gadget", paths)
@@ -75,7 +73,7 @@ def errors(model: Any, data: object) -> dict[str, str]:
     return {".".join(map(str, e["loc"])): e["msg"] for e in caught.value.errors()}
 
 
-def test_configuration_is_frozen() -> None:
+def test_configuration_is_frozen():
     with pytest.raises(AttributeError) as caught:
         Lamp().watts = 7
     assert str(caught.value) == (
@@ -84,7 +82,7 @@ def test_configuration_is_frozen() -> None:
     )
 
 
-def test_class_variables_cannot_be_shadowed() -> None:
+def test_class_variables_cannot_be_shadowed():
     with pytest.raises(AttributeError):
         Lamp().type_name = "torch"  # type: ignore[misc]
 
@@ -98,13 +96,13 @@ def test_class_variables_cannot_be_shadowed() -> None:
         ("to: object.__class__.__call__ = 3", "Unable to generate pydantic-core schema"),
     ],
 )
-def test_field_that_is_no_configuration_is_an_error_of_its_class(field: str, message: str) -> None:
+def test_field_that_is_no_configuration_is_an_error_of_its_class(field, message):
     with pytest.raises(PydanticUserError) as caught:
         exec(f"class Guard(Lamp):\n    {field}", {"Lamp": Lamp})
     assert message in str(caught.value)
 
 
-def test_run_state_is_free_copied_and_not_dumped() -> None:
+def test_run_state_is_free_copied_and_not_dumped():
     lamp = Lamp()
     lamp.seen = [1]  # type: ignore[attr-defined]
     twin = copy.deepcopy(lamp)
@@ -116,28 +114,28 @@ def test_run_state_is_free_copied_and_not_dumped() -> None:
     assert {"cell": 0.05, "watts": 5, "warm_up": "1 min"} == lamp.model_dump(mode="json")
 
 
-def test_equal_configurations_hash_alike() -> None:
+def test_equal_configurations_hash_alike():
     assert hash(Lamp(watts=3)) == hash(Lamp(watts=3))
 
 
-def test_unknown_key_names_the_nearest_and_all() -> None:
+def test_unknown_key_names_the_nearest_and_all():
     assert errors(Lamp, {"wats": 3}) == {
         "wats": "unknown key 'wats': did you mean 'watts'? Allowed here: cell, warm_up, watts"
     }
 
 
-def test_lookup_by_name_and_alias() -> None:
+def test_lookup_by_name_and_alias():
     assert Lamp is lookup("gadget", "lamp") is lookup("gadget", "light")
     assert {"fan": Fan, "lamp": Lamp} == components("gadget")
 
 
-def test_lookup_of_an_unknown_name_lists_what_exists() -> None:
+def test_lookup_of_an_unknown_name_lists_what_exists():
     with pytest.raises(ScenarioError, match=r"'lmap': did you mean 'lamp'\? There are: fan, lamp"):
         lookup("gadget", "lmap")
 
 
 @pytest.mark.parametrize("kind", COMPONENTS)
-def test_every_class_of_the_table_is_of_its_kind_and_knows_its_name(kind: str) -> None:
+def test_every_class_of_the_table_is_of_its_kind_and_knows_its_name(kind):
     types = components(kind)
 
     assert all(cls.kind == kind for cls in types.values())
@@ -145,9 +143,7 @@ def test_every_class_of_the_table_is_of_its_kind_and_knows_its_name(kind: str) -
     assert {lookup(kind, name).type_name for name in COMPONENTS[kind]} <= set(types)
 
 
-def test_class_of_a_plugin_that_nobody_looked_up_is_dumped_by_its_name(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_class_of_a_plugin_that_nobody_looked_up_is_dumped_by_its_name(monkeypatch):
     path = f"{__name__}:Lamp"
     entry = EntryPoint("torch", path, "fleet2d.gadget")
     monkeypatch.setattr(Lamp, "type_name", path)
@@ -158,12 +154,12 @@ def test_class_of_a_plugin_that_nobody_looked_up_is_dumped_by_its_name(
     assert "torch" == Shelf(top=Lamp()).model_dump()["top"]["type"]
 
 
-def test_base_is_the_class_that_declares_the_kind() -> None:
+def test_base_is_the_class_that_declares_the_kind():
     assert Gadget is base_of(Lamp)
 
 
 @pytest.mark.parametrize("name", ["meander", "schedule", "patrol"])
-def test_builtin_component_is_found_without_an_import(name: str) -> None:
+def test_builtin_component_is_found_without_an_import(name):
     code = f"from fleet2d.configuration.components import lookup; print(lookup('behavior', {name!r}).type_name)"
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
@@ -184,7 +180,7 @@ class Own(Component):
 
 
 @pytest.fixture
-def folders(tmp_path: Path) -> tuple[Path, Path]:
+def folders(tmp_path):
     """Two scenario folders with equally named modules that differ."""
     for number in (1, 2):
         folder = tmp_path / str(number)
@@ -197,9 +193,7 @@ def folders(tmp_path: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.parametrize(("name", "factor"), [("own:Own", 1), ("parts.own:Own", 10)])
-def test_equal_module_names_of_two_folders_stay_apart(
-    folders: tuple[Path, Path], name: str, factor: int
-) -> None:
+def test_equal_module_names_of_two_folders_stay_apart(folders, name, factor):
     first, second = (lookup("gadget", Text(name, folder)) for folder in folders)
 
     assert (factor, 2 * factor) == (first().size, second().size)  # type: ignore[attr-defined]
@@ -207,22 +201,20 @@ def test_equal_module_names_of_two_folders_stay_apart(
     assert "helpers" not in sys.modules
 
 
-def test_own_component_is_found_again_by_the_name_it_dumps(folders: tuple[Path, Path]) -> None:
+def test_own_component_is_found_again_by_the_name_it_dumps(folders):
     cls = lookup("gadget", Text("parts.own:Own", folders[1]))
 
     assert f"{folders[1]}/parts.own:Own" == cls.type_name
     assert cls is lookup("gadget", cls.type_name)
 
 
-def test_own_component_copies_and_pickles(folders: tuple[Path, Path]) -> None:
+def test_own_component_copies_and_pickles(folders):
     own = lookup("gadget", Text("own:Own", folders[1]))()
 
     assert own == copy.deepcopy(own) == pickle.loads(pickle.dumps(own))
 
 
-def test_module_that_is_imported_already_is_not_loaded_twice(
-    folders: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_module_that_is_imported_already_is_not_loaded_twice(folders, monkeypatch):
     monkeypatch.syspath_prepend(folders[0])
     import own  # type: ignore[import-not-found]
 
@@ -260,9 +252,7 @@ def test_module_that_is_imported_already_is_not_loaded_twice(
         (":", "can't import ':'"),
     ],
 )
-def test_own_component_that_cannot_be_had_is_explained(
-    folders: tuple[Path, Path], name: str, message: str
-) -> None:
+def test_own_component_that_cannot_be_had_is_explained(folders, name, message):
     (folders[0] / "broken.py").write_text("1 / 0")
     (folders[0] / "unparsable.py").write_text("class Own(")
     (folders[0] / "needs.py").write_text("import sys\nimport nowhere")
@@ -282,12 +272,12 @@ def test_own_component_that_cannot_be_had_is_explained(
     assert str(folders[0]) not in sys.path
 
 
-def test_component_that_lacks_a_method_is_refused() -> None:
+def test_component_that_lacks_a_method_is_refused():
     with pytest.raises(ScenarioError, match="is an incomplete floorplan: it lacks load"):
         lookup("floorplan", "fleet2d.floorplan.source:FloorPlanSource")
 
 
-def test_one_of_reads_a_mapping_a_name_and_an_instance() -> None:
+def test_one_of_reads_a_mapping_a_name_and_an_instance():
     fan = Fan(blades=(1,))
     shelf = Shelf.model_validate({"top": {"type": "light", "watts": 3}, "others": ["lamp", fan]})
 
@@ -295,7 +285,7 @@ def test_one_of_reads_a_mapping_a_name_and_an_instance() -> None:
     assert (Lamp(), fan) == shelf.others
 
 
-def test_one_of_dumps_what_validates_to_an_equal_model() -> None:
+def test_one_of_dumps_what_validates_to_an_equal_model():
     shelf = Shelf(top=Fan(blades=(1, 2)), others=(Lamp(warm_up="90 s"),))  # type: ignore[arg-type]
     dumped = shelf.model_dump(mode="json")
 
@@ -304,7 +294,7 @@ def test_one_of_dumps_what_validates_to_an_equal_model() -> None:
     assert shelf == Shelf.model_validate(dumped)
 
 
-def test_one_of_places_nested_errors() -> None:
+def test_one_of_places_nested_errors():
     assert errors(
         Shelf,
         {
@@ -323,7 +313,7 @@ def test_one_of_places_nested_errors() -> None:
     }
 
 
-def test_one_of_refuses_an_instance_of_another_kind() -> None:
+def test_one_of_refuses_an_instance_of_another_kind():
     class Stranger(Component):
         kind: ClassVar[str] = "stranger"
 
@@ -367,7 +357,7 @@ class House(Settings):
         ("nothing.at.all", None),
     ],
 )
-def test_kind_at_a_path_is_that_of_the_field(path: str, kind: str | None) -> None:
+def test_kind_at_a_path_is_that_of_the_field(path, kind):
     assert kind == kind_at(House, path.split("."))
 
 
@@ -382,11 +372,11 @@ def test_kind_at_a_path_is_that_of_the_field(path: str, kind: str | None) -> Non
         (3, 3),
     ],
 )  # fmt: skip
-def test_split_short_form(written: object, split: object) -> None:
+def test_split_short_form(written, split):
     assert split == split_short_form(written, ["radius"])
 
 
-def test_short_form_equals_long_form() -> None:
+def test_short_form_equals_long_form():
     adapter: TypeAdapter[Body] = TypeAdapter(SHORT)
 
     assert adapter.validate_python(
@@ -394,7 +384,7 @@ def test_short_form_equals_long_form() -> None:
     ) == adapter.validate_python({"type": "lamp", "radius": 1, "watts": 2})
 
 
-def test_short_form_errors_name_keys_as_written() -> None:
+def test_short_form_errors_name_keys_as_written():
     assert errors(SHORT, {"type": "lamp", "radius": "x", "watts": 0, "radiu": 1}) == {
         "radius": "expected a length, got 'x': write a number in m, or like '0.2 m', '20 cm', '5 mm'",
         "watts": "Input should be greater than 0",
@@ -404,15 +394,13 @@ def test_short_form_errors_name_keys_as_written() -> None:
     assert ["type"] == list(errors(SHORT, {"type": "lmap"}))
 
 
-def test_short_form_beside_behaviors_is_refused() -> None:
+def test_short_form_beside_behaviors_is_refused():
     assert errors(SHORT, {"type": "lamp", "behaviors": []}) == {
         "behaviors": "give 'type' (one behavior) or 'behaviors', not both"
     }
 
 
-def test_file_beside_the_scenario_takes_no_plugin_s_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_beside_the_scenario_takes_no_plugin_s_place(tmp_path, monkeypatch):
     beside = tmp_path / "tests" / "own_errors.py"
     beside.parent.mkdir()
     beside.write_text("raise SystemExit('code beside the scenario runs')", encoding="utf-8")
@@ -421,7 +409,7 @@ def test_file_beside_the_scenario_takes_no_plugin_s_place(
     assert Missed is import_class("tests.own_errors:Missed", is_plugin=True)
 
 
-def test_plugin_whose_package_is_gone_is_no_component(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plugin_whose_package_is_gone_is_no_component(monkeypatch):
     entry = EntryPoint("fox", "no_such_package.foxes:Fox", "fleet2d.gadget")
     monkeypatch.setattr(
         "fleet2d.configuration.components._plugins", lambda kind: EntryPoints([entry])
@@ -432,7 +420,7 @@ def test_plugin_whose_package_is_gone_is_no_component(monkeypatch: pytest.Monkey
         lookup("gadget", "fox")
 
 
-def test_type_in_a_module_of_another_name_loads_that_module_alone() -> None:
+def test_type_in_a_module_of_another_name_loads_that_module_alone():
     code = (
         "import sys\n"
         "from fleet2d.configuration.components import lookup\n"

@@ -43,7 +43,7 @@ def properties_of(cls: type[Settings]) -> dict[str, Any]:
     }
 
 
-def test_descriptions_are_those_of_the_class_and_its_bases() -> None:
+def test_descriptions_are_those_of_the_class_and_its_bases():
     assert descriptions(Torch) == {
         "power": "Its power: what it takes on two lines [W].",
         "most": "Its maximum.",
@@ -51,11 +51,11 @@ def test_descriptions_are_those_of_the_class_and_its_bases() -> None:
     }
 
 
-def test_summary_ends_before_the_first_section() -> None:
+def test_summary_ends_before_the_first_section():
     assert summary(Lamp) == "A lamp.\n\nIt hangs."
 
 
-def test_schema_has_them_but_for_fields_with_a_description_of_their_own() -> None:
+def test_schema_has_them_but_for_fields_with_a_description_of_their_own():
     assert properties_of(Torch) == {
         "power": "Its power: what it takes on two lines [W].",
         "most": "Its maximum.",
@@ -65,6 +65,6 @@ def test_schema_has_them_but_for_fields_with_a_description_of_their_own() -> Non
     assert Lamp.model_json_schema()["description"] == "A lamp.\n\nIt hangs."
 
 
-def test_settings_of_algorithms_are_described() -> None:
+def test_settings_of_algorithms_are_described():
     for name, cls in components("algorithm").items():
         assert [name, []] == [name, [key for key, text in properties_of(cls).items() if not text]]

@@ -43,23 +43,23 @@ from fleet2d.errors import InputError, ScenarioError
         ("{1: a, true: b}", {"1": "a", "true": "b"}),
     ],
 )
-def test_value_is_read_as_written(written: str, value: object) -> None:
+def test_value_is_read_as_written(written, value):
     read = parse_yaml(written, Path(), "example")
 
     assert (type(value), value) == (type(read) if not isinstance(read, Text) else str, read)
 
 
-def test_text_knows_the_folder_it_was_written_in() -> None:
+def test_text_knows_the_folder_it_was_written_in():
     assert Path("/homes") == parse_yaml("plan.json", Path("/homes"), "example").folder
 
 
-def test_merged_anchor_is_overridden_by_its_neighbours() -> None:
+def test_merged_anchor_is_overridden_by_its_neighbours():
     text = "base: &b {u: 1, v: 2}\nown: {v: 3, <<: *b}"
 
     assert {"u": 1, "v": 3} == parse_yaml(text, Path(), "example")["own"]
 
 
-def test_places_are_lines(tmp_path: Path) -> None:
+def test_places_are_lines(tmp_path):
     file = tmp_path / "home.yaml"
     file.write_text("# a home\nusers:\n  ana:\n    stops:\n    - hall\n    - to: bath\n")
     document = read_document(file, "home.yaml")
@@ -100,7 +100,7 @@ def test_places_are_lines(tmp_path: Path) -> None:
         (b"\x7fELF\x80\xff", "home.yaml is not a text file"),
     ],
 )  # fmt: skip
-def test_file_that_is_no_scenario_is_refused(tmp_path: Path, content: bytes, message: str) -> None:
+def test_file_that_is_no_scenario_is_refused(tmp_path, content, message):
     file = tmp_path / "home.yaml"
     file.write_bytes(content)
 
@@ -109,7 +109,7 @@ def test_file_that_is_no_scenario_is_refused(tmp_path: Path, content: bytes, mes
     assert message in str(caught.value)
 
 
-def test_missing_file_names_the_nearest(tmp_path: Path) -> None:
+def test_missing_file_names_the_nearest(tmp_path):
     (tmp_path / "home.yaml").touch()
 
     with pytest.raises(
@@ -118,12 +118,12 @@ def test_missing_file_names_the_nearest(tmp_path: Path) -> None:
         read_document(tmp_path / "hom.yaml")
 
 
-def test_folder_is_refused(tmp_path: Path) -> None:
+def test_folder_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match="is a folder"):
         read_document(tmp_path)
 
 
-def test_values_of_an_anchor_count_for_each_alias(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_of_an_anchor_count_for_each_alias(monkeypatch):
     monkeypatch.setenv("FLEET2D_MAX_VALUES", "50")
     assert {"a": [1] * 20, "b": 2} == parse(f"a: &a {[1] * 20}\nb: 2")
     with pytest.raises(InputError, match="more than 51 values, and at most 50"):
@@ -133,9 +133,7 @@ def test_values_of_an_anchor_count_for_each_alias(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(
     ("text", "bound"), [("[" * 3000, "DEPTH"), (f"[{'[],' * 3000}]", "VALUES")]
 )
-def test_a_long_text_is_counted_before_its_nodes_are_built(
-    monkeypatch: pytest.MonkeyPatch, text: str, bound: str
-) -> None:
+def test_a_long_text_is_counted_before_its_nodes_are_built(monkeypatch, text, bound):
     monkeypatch.setenv("FLEET2D_MAX_VALUES", "100")
     monkeypatch.setattr(documents, "_composed", lambda _: pytest.fail("nodes were built"))
     with pytest.raises(InputError, match=f"set FLEET2D_MAX_{bound}="):

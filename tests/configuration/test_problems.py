@@ -3,7 +3,7 @@
 from datetime import date, datetime
 from decimal import Decimal
 from enum import Enum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import pytest
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
@@ -47,7 +47,7 @@ class Everything(BaseModel):
 
 
 @pytest.mark.parametrize("value", ["x", -1, [1], None, {"a": "b"}, float("nan"), b"\xff", True])
-def test_rewritten_error_says_the_same(value: Any) -> None:
+def test_rewritten_error_says_the_same(value):
     with pytest.raises(ValidationError) as caught:
         Everything.model_validate(dict.fromkeys(Everything.model_fields, value))
     again = rewrite(caught.value, lambda line: line)
@@ -57,7 +57,7 @@ def test_rewritten_error_says_the_same(value: Any) -> None:
     ]
 
 
-def test_rewriting_moves_an_error() -> None:
+def test_rewriting_moves_an_error():
     error = rewrite(problem_at(("a", "b"), "no {b}"), lambda line: {**line, "loc": ("c",)})
 
     assert [(("c",), "no {b}")] == [(e["loc"], e["msg"]) for e in error.errors()]
@@ -70,11 +70,11 @@ def test_rewriting_moves_an_error() -> None:
         (3, "unknown key 3. Allowed here: radius, speed"),
     ],
 )
-def test_unknown_key_names_the_known(key: object, message: str) -> None:
+def test_unknown_key_names_the_known(key, message):
     assert message == str(unknown_key(key, ["speed", "radius"]))
 
 
-def test_nothing_near_is_not_guessed() -> None:
+def test_nothing_near_is_not_guessed():
     assert "." == did_you_mean("xyz", ["speed"])
 
 
@@ -87,5 +87,5 @@ def test_nothing_near_is_not_guessed() -> None:
         ("speed", [], ". It has: none"),
     ],
 )
-def test_suggestion_ends_in_all_known_names(name: object, known: list[object], text: str) -> None:
+def test_suggestion_ends_in_all_known_names(name, known, text):
     assert text == suggest(name, known, "It has")

@@ -44,7 +44,7 @@ class Count(fleet2d.Algorithm):
 
 
 @pytest.fixture
-def fleet2d(fleet2d: Cli) -> Cli:
+def fleet2d(fleet2d):
     """The command line in a folder with a scenario, a study and a search with code of their own."""
     Path("mine.py").write_text(CODE)
     home = base(algorithms={"count": {"type": "mine:Count", "period": "1 min"}})
@@ -78,14 +78,14 @@ SERIAL = ("--executor", "serial")
         ("validate", "home.yaml"),
     ],
 )
-def test_own_files_run_what_they_name(fleet2d: Cli, command: tuple[str, ...]) -> None:
+def test_own_files_run_what_they_name(fleet2d, command):
     """`study run` refused one's own file while `run` had just executed its components."""
     code, _, err = fleet2d(*command)
     expected = 2 if command[0] == "validate" else 0  # a room of this home can't be reached
     assert (expected, True) == (code, Path("ran").exists()), err
 
 
-def test_an_own_scenario_that_is_watched_runs_what_it_names(fleet2d: Cli) -> None:
+def test_an_own_scenario_that_is_watched_runs_what_it_names(fleet2d):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = str(taken.getsockname()[1])
@@ -105,9 +105,7 @@ def elsewhere(folder: Path, store: Path, name: str) -> Path:
     return other / "mine.py"
 
 
-def test_a_variant_of_a_stored_study_asks_for_trust(
-    fleet2d: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_variant_of_a_stored_study_asks_for_trust(fleet2d, tmp_path, monkeypatch):
     assert 0 == fleet2d("study", "run", "study.yaml", *SERIAL)[0]
     assert 0 == fleet2d("study", "rerun", "studies/study", "0")[0]  # loaded already: its own code
     (tmp_path / "other").mkdir()
@@ -150,8 +148,8 @@ def stored(folder: Path) -> Path:
     ],
 )
 def test_a_stored_run_is_shown_without_code_unless_a_body_needs_it(
-    fleet2d: Cli, tmp_path: Path, command: tuple[str, ...], made: str
-) -> None:
+    fleet2d, tmp_path, command, made
+):
     theirs = stored(tmp_path)
     code, _, err = fleet2d(*command)
     assert not Path("ran").exists()
@@ -166,7 +164,7 @@ def test_a_stored_run_is_shown_without_code_unless_a_body_needs_it(
     assert Path(made).exists()
 
 
-def test_a_path_of_a_stored_run_asks_for_trust_in_python_too(fleet2d: Cli, tmp_path: Path) -> None:
+def test_a_path_of_a_stored_run_asks_for_trust_in_python_too(fleet2d, tmp_path):
     stored(tmp_path)
     run = package.open_run("run")
     for use in (lambda: run.path("ana"), lambda: package.judge("always(room(ana) != bath)", run)):
@@ -176,7 +174,7 @@ def test_a_path_of_a_stored_run_asks_for_trust_in_python_too(fleet2d: Cli, tmp_p
     assert 0 < len(package.open_run("run", trust=True).path("ana").x)
 
 
-def test_a_run_of_this_process_needs_no_trust(fleet2d: Cli, tmp_path: Path) -> None:
+def test_a_run_of_this_process_needs_no_trust(fleet2d, tmp_path):
     run = package.run("home.yaml", seed=4, out="run")
     assert run.trust
     assert 0 < len(run.path("ana").x)
@@ -215,8 +213,8 @@ def half_a_run(name: str) -> package.Simulation:
 
 @pytest.mark.parametrize(("command", "status"), [("resume", "interrupted"), ("verify --again", "complete")])  # fmt: skip
 def test_an_interrupt_that_only_a_plan_from_outside_names_is_listed(
-    fleet2d: Cli, tmp_path: Path, command: str, status: str
-) -> None:
+    fleet2d, tmp_path, command, status
+):
     """A run directory from elsewhere named its code there, and `resume` ran it without a word."""
     half_a_run("home_empty").finish()
     path = Path("half/manifest.json")
@@ -228,9 +226,7 @@ def test_an_interrupt_that_only_a_plan_from_outside_names_is_listed(
     assert f"{tmp_path}/theirs.py (interventions.1.plan.interrupts.0)" in err
 
 
-def test_an_interrupt_that_only_a_checkpoint_names_asks_for_trust(
-    fleet2d: Cli, tmp_path: Path
-) -> None:
+def test_an_interrupt_that_only_a_checkpoint_names_asks_for_trust(fleet2d, tmp_path):
     """Its code is imported when the run goes on, after the run was set up and looked harmless."""
     half_a_run(f"{tmp_path}/theirs:Never").finish()
     code, _, err = fleet2d("resume", "half")
@@ -238,7 +234,7 @@ def test_an_interrupt_that_only_a_checkpoint_names_asks_for_trust(
     assert f"would run {tmp_path}/theirs.py, which is not trusted" in err
 
 
-def test_a_simulation_takes_its_trust_into_threads(fleet2d: Cli, tmp_path: Path) -> None:
+def test_a_simulation_takes_its_trust_into_threads(fleet2d, tmp_path):
     """`view` simulates in a thread, which has no command line that it could ask."""
     with running_code(allowed=False):
         simulation = half_a_run(f"{tmp_path}/theirs:Never")
@@ -247,14 +243,14 @@ def test_a_simulation_takes_its_trust_into_threads(fleet2d: Cli, tmp_path: Path)
     assert not Path("ran").exists()
 
 
-def test_files_that_a_component_imports_from_beside_it_are_listed(tmp_path: Path) -> None:
+def test_files_that_a_component_imports_from_beside_it_are_listed(tmp_path):
     (tmp_path / "mine.py").write_text("import theirs")
     (tmp_path / "theirs.py").write_text("")
     code = code_of({"type": f"{tmp_path}/mine:Own"})
     assert {f"{tmp_path}/mine.py": ["type"], f"{tmp_path}/theirs.py": ["type"]} == code
 
 
-def test_all_of_a_program_is_listed(tmp_path: Path) -> None:
+def test_all_of_a_program_is_listed(tmp_path):
     """Arguments weren't shown: `/bin/sh -c …` read as `/bin/sh`."""
     program = tmp_path / "my program"
     program.touch()
@@ -267,7 +263,7 @@ def test_all_of_a_program_is_listed(tmp_path: Path) -> None:
     assert f"{line} (algorithms.p.command)" in str(caught.value).splitlines()
 
 
-def test_the_name_of_a_stored_run_is_escaped() -> None:
+def test_the_name_of_a_stored_run_is_escaped():
     content = {"algorithms": {"a": {"type": "mine:Own"}}}
     with (
         pytest.raises(UntrustedCodeError, match=r"^month\\x1b\[2J has code of its own"),
@@ -276,7 +272,7 @@ def test_the_name_of_a_stored_run_is_escaped() -> None:
         pass
 
 
-def test_all_files_are_listed_however_many_they_are(tmp_path: Path) -> None:
+def test_all_files_are_listed_however_many_they_are(tmp_path):
     content = {f"a{i}": {"type": f"{tmp_path}/mine{i}:Own"} for i in range(500)}
     with pytest.raises(UntrustedCodeError) as caught, stored_code("it", content, trust=False):
         pass
@@ -284,13 +280,11 @@ def test_all_files_are_listed_however_many_they_are(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("word", ["fetch", "", "a\0b", "x" * 5000, "/"])
-def test_other_commands_are_no_programs(tmp_path: Path, word: str) -> None:
+def test_other_commands_are_no_programs(tmp_path, word):
     assert {} == code_of({"script": [{"call": "astro", "command": word}]})
 
 
-def test_a_file_that_a_stored_scenario_extends_is_listed_and_its_code_asks(
-    fleet2d: Cli, tmp_path: Path
-) -> None:
+def test_a_file_that_a_stored_scenario_extends_is_listed_and_its_code_asks(fleet2d, tmp_path):
     """A forged manifest may extend a file that names the code."""
     package.run("bundled:paper", "simulation.duration=1 min", seed=4, out="run")
     path = Path("run/manifest.json")
@@ -305,7 +299,7 @@ def test_a_file_that_a_stored_scenario_extends_is_listed_and_its_code_asks(
 
 
 @pytest.mark.parametrize("name", ["mine:Über", "a/b/mine.py:C", "mine:A.B", "../x:Y", "ü.ö:ä"])
-def test_no_name_of_code_hides_from_the_list(name: str) -> None:
+def test_no_name_of_code_hides_from_the_list(name):
     assert [["a.0.type"]] == list(code_of({"a": [{"type": name}]}).values())
     content = {"a": [{"type": name}]}
     with (
@@ -316,5 +310,5 @@ def test_no_name_of_code_hides_from_the_list(name: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["08:00-22:00", "12:30", "a b:C", "mine:", ":C", "09:00"])
-def test_other_texts_are_no_code(text: str) -> None:
+def test_other_texts_are_no_code(text):
     assert {} == code_of({"at": text})

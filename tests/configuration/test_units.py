@@ -71,12 +71,12 @@ def message(type_: Any, value: object) -> str:
         (0, 0),
     ],
 )
-def test_duration_is_read_exactly(written: object, microseconds: int) -> None:
+def test_duration_is_read_exactly(written, microseconds):
     assert microseconds == micros(read(Duration, written))
 
 
 @given(st.integers(0, micros(MAX_DURATION)))
-def test_duration_survives_its_canonical_spelling(count: int) -> None:
+def test_duration_survives_its_canonical_spelling(count):
     duration = timedelta(microseconds=count)
 
     assert duration == parse_duration(format_duration(duration))
@@ -87,7 +87,7 @@ def test_duration_survives_its_canonical_spelling(count: int) -> None:
     [("30 d", "30 d"), ("60 min", "1 h"), ("90 s", "90 s"), ("500 ms", "0.5 s"), (0, "0 s"),
      ("2 weeks", "14 d"), ("1 us", "0.000001 s"), ("36 h", "36 h"), ("100 s", "100 s")],
 )  # fmt: skip
-def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dumped: str) -> None:
+def test_duration_dumps_in_the_largest_unit_that_divides_it(written, dumped):
     class Model(BaseModel):
         value: Duration
 
@@ -120,15 +120,15 @@ def test_duration_dumps_in_the_largest_unit_that_divides_it(written: object, dum
         (float("inf"), "expected a duration, a finite number, got inf"),
     ],
 )  # fmt: skip
-def test_duration_says_what_is_wrong(written: object, said: str) -> None:
+def test_duration_says_what_is_wrong(written, said):
     assert said in message(Duration, written)
 
 
-def test_huge_exponent_is_refused_before_it_fills_the_memory() -> None:
+def test_huge_exponent_is_refused_before_it_fills_the_memory():
     assert "expected a length" in message(Length, "1e999999999 m")
 
 
-def test_positive_duration_refuses_zero() -> None:
+def test_positive_duration_refuses_zero():
     assert "expected a duration longer than 0, got 0 s" == message(PositiveDuration, 0)
 
 
@@ -151,7 +151,7 @@ def test_positive_duration_refuses_zero() -> None:
         (Share, "95 %", 0.95),
     ],
 )
-def test_quantity_is_read_in_its_base_unit(type_: Any, written: object, number: float) -> None:
+def test_quantity_is_read_in_its_base_unit(type_, written, number):
     assert number == read(type_, written)
 
 
@@ -169,7 +169,7 @@ def test_quantity_is_read_in_its_base_unit(type_: Any, written: object, number: 
         (Share, "95", "expected a share from 0 to 1"),
     ],
 )
-def test_quantity_says_what_is_wrong(type_: Any, written: object, said: str) -> None:
+def test_quantity_says_what_is_wrong(type_, written, said):
     assert said in message(type_, written)
 
 
@@ -179,9 +179,7 @@ def test_quantity_says_what_is_wrong(type_: Any, written: object, said: str) -> 
      ("00:00:05.25", 5.25, "00:00:05.25"), ("24:00", 86_400, "24:00"),
      (timedelta(hours=1), 3600, "01:00")],
 )  # fmt: skip
-def test_time_of_day_is_the_time_since_midnight(
-    written: object, seconds: float, dumped: str
-) -> None:
+def test_time_of_day_is_the_time_since_midnight(written, seconds, dumped):
     adapter: TypeAdapter[timedelta] = TypeAdapter(TimeOfDay)
     value = adapter.validate_python(written)
 
@@ -189,7 +187,7 @@ def test_time_of_day_is_the_time_since_midnight(
 
 
 @pytest.mark.parametrize("written", ["24:01", "25:00", "7", "07:60", 450, "noon", None, "07:30 pm"])
-def test_time_of_day_refuses_what_no_clock_shows(written: object) -> None:
+def test_time_of_day_refuses_what_no_clock_shows(written):
     assert "expected a time of day" in message(TimeOfDay, written)
 
 
@@ -197,62 +195,60 @@ def test_time_of_day_refuses_what_no_clock_shows(written: object) -> None:
     "type_",
     [Duration, PositiveDuration, Length, Speed, AngleDeg, TurnRateDeg, Share, TimeOfDay, InputPath],
 )
-def test_json_schema_describes_each_quantity(type_: Any) -> None:
+def test_json_schema_describes_each_quantity(type_):
     schema = TypeAdapter(type_).json_schema()
 
     assert schema["description"]
     assert schema["x-quantity"]
 
 
-def test_path_starts_from_the_folder_of_its_file(tmp_path: Path) -> None:
+def test_path_starts_from_the_folder_of_its_file(tmp_path):
     (tmp_path / "plan.json").touch()
 
     assert tmp_path / "plan.json" == read(InputPath, Text("plan.json", tmp_path))
 
 
-def test_path_starts_from_the_current_folder_otherwise(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_path_starts_from_the_current_folder_otherwise(tmp_path, monkeypatch):
     (tmp_path / "plan.json").touch()
     monkeypatch.chdir(tmp_path)
 
     assert tmp_path / "plan.json" == read(InputPath, "plan.json")
 
 
-def test_path_that_is_no_file_is_refused(tmp_path: Path) -> None:
+def test_path_that_is_no_file_is_refused(tmp_path):
     assert f"no such file: {tmp_path / 'x'}" == message(InputPath, Text("x", tmp_path))
     assert f"a folder, not a file: {tmp_path}" == message(InputPath, tmp_path)
     assert "expected the path of a file, got 3" == message(InputPath, 3)
 
 
-def test_text_keeps_its_folder_in_copies() -> None:
+def test_text_keeps_its_folder_in_copies():
     text = Text("plan.json", Path("/homes"))
 
     assert Path("/homes") == copy.deepcopy(text).folder == pickle.loads(pickle.dumps(text)).folder
 
 
 @pytest.mark.parametrize("duration", [timedelta(0), timedelta(seconds=3), timedelta(seconds=1)])
-def test_no_multiple_of_the_step_is_refused(duration: timedelta) -> None:
+def test_no_multiple_of_the_step_is_refused(duration):
     with pytest.raises(
         ScenarioError, match=r"^period is \d s, which is not a multiple of .* \(2 s\)"
     ):
         whole_steps(duration, 2_000_000, "period")
 
 
-def test_multiple_of_the_step_is_counted() -> None:
+def test_multiple_of_the_step_is_counted():
     assert 3 == whole_steps(timedelta(seconds=6), 2_000_000, "period")
 
 
-def test_every_name_that_a_scenario_may_give_stands_for_days() -> None:
+def test_every_name_that_a_scenario_may_give_stands_for_days():
     assert (*GROUPS, *WEEKDAYS) == get_args(Days)
     assert set(range(7)) == weekdays_of("daily") == weekdays_of(WEEKDAYS)
     assert weekdays_of("daily") == weekdays_of(("weekdays", "weekend"))
 
 
-def test_monday_is_the_first_day() -> None:
+def test_monday_is_the_first_day():
     assert [{day} for day in range(7)] == [weekdays_of(name) for name in WEEKDAYS]
 
 
-def test_unknown_day_is_told_with_the_known() -> None:
+def test_unknown_day_is_told_with_the_known():
     with pytest.raises(PydanticCustomError, match="unknown day 'mondy'; there are: daily, "):
         weekdays_of(["weekend", "mondy"])

@@ -36,12 +36,12 @@ def content(folder: Path, **sections: Any) -> dict[str, Any]:
     )
 
 
-def test_a_model_within_an_algorithm_is_noted_with_its_weights(tmp_path: Path) -> None:
+def test_a_model_within_an_algorithm_is_noted_with_its_weights(tmp_path):
     paths = input_files(fleet2d.load_scenario(content(tmp_path)))
     assert {flat_path(), tmp_path / "net.py", tmp_path / "weights.npy"} == set(paths)
 
 
-def test_other_weights_are_said_to_have_changed(tmp_path: Path) -> None:
+def test_other_weights_are_said_to_have_changed(tmp_path):
     fleet2d.run(content(tmp_path), out=tmp_path / "run")
     assert [] == fleet2d.reproduce(tmp_path / "run").causes
     np.save(tmp_path / "weights.npy", np.full(1, 1.0000001))
@@ -68,7 +68,7 @@ class Crowded(Interrupt):
 
 
 @pytest.mark.parametrize("is_imported", [True, False])
-def test_an_interrupt_that_only_a_plan_names_is_noted(tmp_path: Path, is_imported: bool) -> None:
+def test_an_interrupt_that_only_a_plan_names_is_noted(tmp_path, is_imported):
     """It may be imported beside the behavior, or named in a text: then it is known at the end."""
     crowded = tmp_path / "crowd.py"
     crowded.write_text(CROWDED)
@@ -84,7 +84,7 @@ def test_an_interrupt_that_only_a_plan_names_is_noted(tmp_path: Path, is_importe
     assert [f"{crowded} has changed since"] == fleet2d.reproduce(tmp_path / "run").causes
 
 
-def test_a_component_of_a_file_beside_is_named_by_its_folder(tmp_path: Path) -> None:
+def test_a_component_of_a_file_beside_is_named_by_its_folder(tmp_path):
     """Its manifest said "waits:Waits", which only a process in that folder could import."""
     (tmp_path / "mine.py").write_text("from waits import Waits as Mine")
     (tmp_path / "waits.py").write_text(WAITS.format(imports="", crowded="'home_empty'"))
@@ -97,7 +97,7 @@ def test_a_component_of_a_file_beside_is_named_by_its_folder(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_a_class_without_a_file_is_no_input() -> None:
+def test_a_class_without_a_file_is_no_input():
     """One typed at a prompt; its run ended in a traceback."""
     code = (
         "import fleet2d\n"
@@ -121,7 +121,7 @@ class Glides(Drive):
 """
 
 
-def test_a_drive_and_errors_of_a_camera_are_noted(tmp_path: Path) -> None:
+def test_a_drive_and_errors_of_a_camera_are_noted(tmp_path):
     """Components are found wherever they stand, so that a study notices that one was edited."""
     (tmp_path / "mine.py").write_text(DRIVE)
     (tmp_path / "blurry.py").write_text(

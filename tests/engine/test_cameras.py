@@ -17,7 +17,7 @@ from fleet2d.errors import PlacementError
 from fleet2d.kernels import new_memory
 
 
-def test_a_robot_that_has_seen_nobody_remembers_nothing() -> None:
+def test_a_robot_that_has_seen_nobody_remembers_nothing():
     memory = new_memory(2, 3, 5)
     assert [-1] * 4 == memory.noticed.tolist()
     assert not memory.seen.any()
@@ -57,7 +57,7 @@ class Idle(Glance):
 @pytest.mark.parametrize(
     "stops", [[9], [9, 9], [3, 9], [9, 3], [9, 5, 3], [3, 5, 9], [5, 3, 5, 1, 9]]
 )
-def test_those_who_wait_have_looked_at_the_same_steps(stops: list[int]) -> None:
+def test_those_who_wait_have_looked_at_the_same_steps(stops):
     state = fleet2d.Simulation(scenario())._state
     glances, idle = [Glance(stop) for stop in stops], Idle(1)
     state.watchers = [*glances, idle]
@@ -98,9 +98,7 @@ def looks() -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["line_of_sight", "flashlight"])
-def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
-    method: str,
-) -> None:
+def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(method):
     """What a camera saw beyond the end of a span is as if it had never looked there."""
     simulation = fleet2d.Simulation({**looks(), "sight": {"method": {"type": method}}})
     state, beyond, ended = simulation._state, 0, 0
@@ -128,7 +126,7 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
     assert beyond > 5
 
 
-def test_every_draw_of_every_camera_has_a_stream_of_its_own() -> None:
+def test_every_draw_of_every_camera_has_a_stream_of_its_own():
     content = everything("1 min")
     robot = content["robots"]["astro"]
     robot["cameras"] = {"left": robot.pop("camera"), "right": {}}
@@ -145,14 +143,14 @@ def test_every_draw_of_every_camera_has_a_stream_of_its_own() -> None:
     assert len(set(keys)) == len(keys)
 
 
-def test_a_run_without_users_or_without_robots_has_no_cameras() -> None:
+def test_a_run_without_users_or_without_robots_has_no_cameras():
     for content in (scenario(robots={"r": {}}), scenario(users={"ana": {"camera": {}}})):
         state = fleet2d.Simulation(content)._state
         assert not state.cameras
         assert not state.user_cameras
 
 
-def test_users_with_cameras_look_at_robots_and_robots_at_users() -> None:
+def test_users_with_cameras_look_at_robots_and_robots_at_users():
     content = everything("1 min")
     content["users"]["ben"]["camera"] = {"angle_deg": 180}
     state = fleet2d.Simulation(content)._state
@@ -182,17 +180,17 @@ SHARES = {"detection": {"visible_share": [[0, 0], [1, 1]]}}
         ({"camera": {"height": 1}}, r"astro\.camera\.height has no effect without sight\.heights"),
     ],
 )
-def test_settings_of_sight_without_effect_are_noted(robot: dict[str, Any], note: str) -> None:
+def test_settings_of_sight_without_effect_are_noted(robot, note):
     (text,) = remarks(**robot)
 
     assert re.search(note, text)
 
 
-def test_settings_of_sight_that_have_an_effect_are_not_noted() -> None:
+def test_settings_of_sight_that_have_an_effect_are_not_noted():
     assert [] == remarks(camera={"range": [0.3, 4.5], "body_points": 4}, perception=SHARES)
 
 
-def test_a_spot_outside_the_home_is_refused() -> None:
+def test_a_spot_outside_the_home_is_refused():
     centimetres = {"false_positives": {"spots": [{"at": [400, 250], "per_hour": 1}]}}
 
     with pytest.raises(PlacementError, match=r"spots\.0: \(400, 250\) m is outside the home"):

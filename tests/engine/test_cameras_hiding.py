@@ -30,14 +30,14 @@ def seen(content: dict[str, Any]) -> dict[str, list[int]]:
     return {name: group["step"].tolist() for name, group in rows.groupby("user", observed=True)}
 
 
-def test_a_body_hides_who_is_behind_it() -> None:
+def test_a_body_hides_who_is_behind_it():
     hidden = row_of_people()
 
     assert {"ben": [*range(40)]} == seen(hidden)
     assert {"ana": [*range(40)], "ben": [*range(40)]} == seen({**hidden, "sight": {}})
 
 
-def test_who_walks_through_the_view_hides_others_just_then() -> None:
+def test_who_walks_through_the_view_hides_others_just_then():
     """Only while the walker is within its radius, 10 cm, of the line."""
     script = [10.0, [2.5, 2.8], 60.0]
     ben = {**WALK, "start": [2.5, 3.7], "start_heading_deg": -90, "script": script, "radius": 0.1}
@@ -51,14 +51,14 @@ def test_who_walks_through_the_view_hides_others_just_then() -> None:
     assert ["user_seen", "user_lost", "user_seen"] == rows[rows["user"] == "ana"]["event"].tolist()
 
 
-def test_who_is_away_hides_nobody() -> None:
+def test_who_is_away_hides_nobody():
     out = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}
     content = row_of_people(ben={**out, "radius": 0.25})
 
     assert {"ana": [*range(40)]} == seen(content)
 
 
-def test_a_robot_hides_people_from_another_and_not_from_itself() -> None:
+def test_a_robot_hides_people_from_another_and_not_from_itself():
     content = row_of_people()
     del content["users"]["ben"]
     content["robots"]["bolt"] = {"start": [2.5, 3.5], "start_heading_deg": 0}
@@ -68,7 +68,7 @@ def test_a_robot_hides_people_from_another_and_not_from_itself() -> None:
     assert 40 == len(rows)
 
 
-def test_people_who_look_have_robots_hidden_from_them() -> None:
+def test_people_who_look_have_robots_hidden_from_them():
     content = row_of_people(ana={"start": [4, 3.5], "start_heading_deg": 180, "camera": {}})
 
     for sight, sees in ((content["sight"], False), ({}, True)):
@@ -76,7 +76,7 @@ def test_people_who_look_have_robots_hidden_from_them() -> None:
         assert ("robot_seen" in events) == sees
 
 
-def test_expectations_go_by_what_is_really_in_view() -> None:
+def test_expectations_go_by_what_is_really_in_view():
     content = row_of_people() | {"expect": {"hidden": str(never(in_view("ana", by="astro")))}}
 
     assert run(content).manifest["expectations"]["hidden"]["holds"]
@@ -93,14 +93,14 @@ def crowd(duration: str = "30 min") -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("span", some([7, 1, 61], 3))
-def test_spans_do_not_show_where_bodies_hide_people(span: int) -> None:
+def test_spans_do_not_show_where_bodies_hide_people(span):
     content = crowd()
 
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
 @pytest.mark.parametrize("method", METHODS[:1], ids=["visibility_polygon"])
-def test_run_past_bodies_is_the_same_by_every_exact_method(method: dict[str, Any]) -> None:
+def test_run_past_bodies_is_the_same_by_every_exact_method(method):
     content = crowd("20 min")
     expected = {**digests(run(content)), "run": ""}
 
@@ -110,13 +110,13 @@ def test_run_past_bodies_is_the_same_by_every_exact_method(method: dict[str, Any
     assert expected["observations"] != digests(run({**content, "sight": {}}))["observations"]
 
 
-def test_bodies_hide_people_by_a_method_of_ones_own() -> None:
+def test_bodies_hide_people_by_a_method_of_ones_own():
     xray = {"method": {"type": f"{HERE}:XRay"}, **HIDE["sight"]}
 
     assert {"ben": [*range(40)]} == seen({**row_of_people(), "sight": xray})
 
 
-def test_those_are_perceived_whom_no_body_hides() -> None:
+def test_those_are_perceived_whom_no_body_hides():
     """Against the rule in fractions, step by step, of those whom walls alone leave in view."""
     content = crowd("20 min")
     content["robots"] = {"curio": {**content["robots"]["curio"], "cameras": {"plain": {}}}}

@@ -1,6 +1,5 @@
 """Runs in which perception errs: spans never show, truth stands beside it, algorithms don't see it."""
 
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,7 +10,6 @@ from tests.thorough import some
 import fleet2d
 from fleet2d import Algorithm, History, Metric, Present
 from fleet2d.errors import ComponentError, InputError, ScenarioError
-from fleet2d.runs.run import Run
 
 PERCEPTION: dict[str, Any] = {
     "detection": {
@@ -84,31 +82,29 @@ def full(duration: str = "1 h", **changes: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def whole() -> Run:
+def whole():
     return run(full())
 
 
 @pytest.mark.parametrize("span", some([7, 1, 3600], 3))
-def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> None:
+def test_every_table_is_the_same_for_every_max_span(whole, span):
     other = run(full(), max_span=span)
     assert digests(whole) == digests(other)
     assert whole.metrics == other.metrics
 
 
-def test_every_table_is_the_same_when_watchers_take_in_few_steps_at_once(
-    whole: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_table_is_the_same_when_watchers_take_in_few_steps_at_once(whole, monkeypatch):
     monkeypatch.setattr("fleet2d.engine.state.MAX_STEPS", 1)
     monkeypatch.setattr("fleet2d.engine.state.MIN_STEPS", 50)
     assert digests(whole) == digests(run(full()))
 
 
-def test_a_run_that_errs_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
+def test_a_run_that_errs_is_reproduced_from_its_manifest(tmp_path):
     fleet2d.run(full("5 min"), out=tmp_path / "run")
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
-def test_rows_tell_false_from_true_and_who_from_whom(whole: Run) -> None:
+def test_rows_tell_false_from_true_and_who_from_whom(whole):
     rows = table(whole, "observations")
     astro = rows["robot"] == "astro"
     assert {"front", "rear", "mast"} == set(rows["camera"][astro])
@@ -129,13 +125,13 @@ def test_rows_tell_false_from_true_and_who_from_whom(whole: Run) -> None:
     assert 0.02 < np.median(off) < 0.3
 
 
-def test_every_observation_is_in_a_room() -> None:
+def test_every_observation_is_in_a_room():
     """Noise carries some into walls; the nearest room counts there."""
     rows = table(run(full()), "observations")
     assert not any(room is None or room != room for room in rows["room"])
 
 
-def test_the_truth_is_where_users_were_when_they_were_looked_at() -> None:
+def test_the_truth_is_where_users_were_when_they_were_looked_at():
     stored = run(full(), "artifacts.trajectories=every step")
     rows = table(stored, "observations", robot="astro", true_user="ben")
     truth = table(stored, "trajectories", entity="ben")
@@ -148,21 +144,21 @@ def test_the_truth_is_where_users_were_when_they_were_looked_at() -> None:
             assert (at % 3 == 0).all()
 
 
-def test_where_nothing_errs_no_column_is_added_and_no_row_changes() -> None:
+def test_where_nothing_errs_no_column_is_added_and_no_row_changes():
     plain, told = everything("20 min"), everything("20 min")
     for robot in told["robots"].values():
         robot["perception"] = {}
     assert run(plain).digest == run(told).digest
 
 
-def test_events_are_about_whom_somebody_was_taken_for(whole: Run) -> None:
+def test_events_are_about_whom_somebody_was_taken_for(whole):
     """Somebody unknown is seen, too; the event names nobody then."""
     events = table(whole, "events", entity="curio")
     who = {user if isinstance(user, str) else None for user in events["user"]}
     assert {"ana", "ben", None} == who
 
 
-def test_algorithms_get_what_was_perceived_and_metrics_the_truth_beside_it() -> None:
+def test_algorithms_get_what_was_perceived_and_metrics_the_truth_beside_it():
     content = full("30 min", algorithms={"peek": Peek(period="10 min")})
     content["metrics"] = {"both": Both(period="10 min")}
     Peek.seen.clear()
@@ -186,7 +182,7 @@ def test_algorithms_get_what_was_perceived_and_metrics_the_truth_beside_it() -> 
     ]
 
 
-def test_looks_and_rows_agree() -> None:
+def test_looks_and_rows_agree():
     """Without latency, each look that noticed somebody is a row at its step."""
     content = full("30 min")
     del content["robots"]["astro"]
@@ -201,7 +197,7 @@ def test_looks_and_rows_agree() -> None:
                 assert looks.detected[camera, user] == rows.sum()
 
 
-def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing() -> None:
+def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing():
     content = scenario(
         "1 min",
         users={"ana": {"start": [1.0, 1.0]}},
@@ -246,9 +242,7 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing() -> None:
         ),
     ],
 )
-def test_wrong_settings_are_errors_that_say_what_is_wanted(
-    change: dict[str, Any], words: list[str]
-) -> None:
+def test_wrong_settings_are_errors_that_say_what_is_wanted(change, words):
     content = scenario(users={"ana": {}, "ben": {}}, robots={"r": change})
     with pytest.raises(InputError) as caught:
         fleet2d.Simulation(content)
@@ -257,14 +251,14 @@ def test_wrong_settings_are_errors_that_say_what_is_wanted(
         assert word in str(caught.value)
 
 
-def test_a_list_of_cameras_is_numbered() -> None:
+def test_a_list_of_cameras_is_numbered():
     robot = fleet2d.load_scenario(
         scenario(robots={"r": {"cameras": [{}, {"heading_deg": 180}]}})
     ).robots["r"]
     assert ["camera_00", "camera_01"] == list(robot.eyes)
 
 
-def test_a_behavior_can_wait_for_what_several_cameras_see() -> None:
+def test_a_behavior_can_wait_for_what_several_cameras_see():
     content = everything("30 min")
     robot = content["robots"]["bolt"]
     robot["cameras"] = {"left": {"heading_deg": 60}, "right": {"heading_deg": -60}}

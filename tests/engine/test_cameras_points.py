@@ -85,7 +85,7 @@ def with_odd_cameras() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("method", METHODS, ids=["visited", "few kept", "all"])
-def test_run_is_the_same_by_every_exact_method(method: dict[str, Any]) -> None:
+def test_run_is_the_same_by_every_exact_method(method):
     content = with_odd_cameras()
     expected = stored_without_scenario(content)
 
@@ -93,9 +93,7 @@ def test_run_is_the_same_by_every_exact_method(method: dict[str, Any]) -> None:
     assert len(table(run(content), "observations")["step"]) > 50
 
 
-def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(monkeypatch):
     users = {name: {"start": room} for name, room in (("ana", "kitchen"), ("ben", "living_room"))}
     robots = {
         "astro": {"type": "patrol", "dwell": "5 s"},
@@ -111,7 +109,7 @@ def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(
         assert expected == stored_without_scenario({**content, "sight": {"method": method}})
 
 
-def test_run_by_flashlight_is_nearly_the_same_where_users_walk() -> None:
+def test_run_by_flashlight_is_nearly_the_same_where_users_walk():
     content = everything("20 min")
     content["simulation"]["ghosts"] = True
     exact = run(content)
@@ -124,13 +122,13 @@ def test_run_by_flashlight_is_nearly_the_same_where_users_walk() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("span", some([50, 1], 2))
-def test_spans_do_not_show_in_a_run_by_another_method(span: int) -> None:
+def test_spans_do_not_show_in_a_run_by_another_method(span):
     content = {**with_odd_cameras(), "sight": {"method": {"type": "flashlight"}}}
 
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
-def test_own_method_decides_who_is_in_view() -> None:
+def test_own_method_decides_who_is_in_view():
     users = {"ana": {"start": [7.5, 0.5]}}
     robot = {"start": [0.5, 3.5], "start_heading_deg": -20, "camera": {"range": [0, 20]}}
     content = scenario("1 min", users=users, robots={"astro": robot})
@@ -150,7 +148,7 @@ def test_own_method_decides_who_is_in_view() -> None:
         ("Broken", r"sight.method failed at step 0: KeyError: 'glass'"),
     ],
 )
-def test_own_method_that_fails_is_blamed(method: str, why: str) -> None:
+def test_own_method_that_fails_is_blamed(method, why):
     robot = {"start": [0.5, 3.5], "start_heading_deg": 0}
     content = scenario("1 min", users={"ana": {"start": [2, 3.5]}}, robots={"astro": robot})
     with pytest.raises(ComponentError, match=why):
@@ -200,9 +198,7 @@ def wandering(rng: np.random.Generator, home: Home, bodies: int, steps: int) -> 
     "method", [LineOfSight(), VisibilityPolygon(), Flashlight(), XRay()], ids=repr
 )
 @pytest.mark.parametrize("first", [0, 5])
-def test_points_seen_are_those_of_asking_about_everybody_each_time(
-    method: FieldOfView, first: int
-) -> None:
+def test_points_seen_are_those_of_asking_about_everybody_each_time(method, first):
     home = Home(fleet2d.load_floorplan(flat_path()))
     cameras = [Camera.model_validate(c) for c in (ODD, {"period": "3 s"}, {"angle_deg": 330})]
     scene = TableContext(["a", "b", "c"], [256.0] * 3, home.plan.lattice, SECOND, "robots.r")
@@ -236,7 +232,7 @@ def sights(stored: Any) -> list[tuple[int, str, str, str]]:
     return list(zip(rows["step"], rows["entity"], rows["event"], rows["detail"], strict=True))
 
 
-def test_user_with_a_camera_sees_robots_come_and_go() -> None:
+def test_user_with_a_camera_sees_robots_come_and_go():
     result = sights(run(facing()))
 
     assert len(result) > 8
@@ -247,7 +243,7 @@ def test_user_with_a_camera_sees_robots_come_and_go() -> None:
     assert [] == sights(run(behind))
 
 
-def test_user_sees_a_robot_just_when_a_robot_like_the_user_would_see_a_user_like_it() -> None:
+def test_user_sees_a_robot_just_when_a_robot_like_the_user_would_see_a_user_like_it():
     content = facing(lost_after="1 s")
     ana = dict(content["users"]["ana"])
     astro = {**content["robots"]["astro"], "radius": 0.2, "speed": 0.6, "turn_rate_deg": 90}
@@ -265,7 +261,7 @@ def test_user_sees_a_robot_just_when_a_robot_like_the_user_would_see_a_user_like
     assert expected == [(step, event) for step, _, event, _ in result]
 
 
-def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show() -> None:
+def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show():
     content = facing()
     content["users"]["ana"]["behaviors"] = [{"type": f"{HERE}:Shy"}]
     stored = run(content)
@@ -275,7 +271,7 @@ def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show() -> 
     assert digests(stored) == digests(run(content, max_span=1))
 
 
-def test_users_who_look_change_nothing_else() -> None:
+def test_users_who_look_change_nothing_else():
     content = everything("20 min")
     looking = everything("20 min")
     looking["users"]["ben"]["camera"] = {"angle_deg": 180}
@@ -285,7 +281,7 @@ def test_users_who_look_change_nothing_else() -> None:
     assert ["events"] == [name for name in before if before[name] != after[name]]
 
 
-def test_user_that_errs_is_refused() -> None:
+def test_user_that_errs_is_refused():
     with pytest.raises(InputError, match=r"camera.perception: .*users see robots as they are"):
         fleet2d.load_scenario(facing(perception={"detection": {"distance": 0.5}}))
     content = facing()

@@ -78,7 +78,7 @@ robots:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """Return a folder with the scenario and its home: a hall of 10 m by 10 m."""
     made = tmp_path_factory.mktemp("hall")
     outline = [[0, 0], [10, 0], [10, 10], [0, 10]]
@@ -104,7 +104,7 @@ def observations(file: Path) -> tuple[Rows, fleet2d.Run]:
 
 
 @pytest.fixture(scope="module")
-def rows(folder: Path) -> Rows:
+def rows(folder):
     return observations(folder / "scenario.yaml")[0]
 
 
@@ -141,7 +141,7 @@ def check_by(values: F64, edges: npt.ArrayLike, happened: Bool, share: F64) -> N
 
 
 @pytest.mark.slow
-def test_who_was_in_view_is_within_range_and_angle(rows: Rows) -> None:
+def test_who_was_in_view_is_within_range_and_angle(rows):
     looks = of(rows, "sharp")
     distance, bearing = from_eye(looks["x"], looks["y"])
     assert 0.29 < distance.min() < 1 < 5.9 < distance.max() < 6.01
@@ -150,7 +150,7 @@ def test_who_was_in_view_is_within_range_and_angle(rows: Rows) -> None:
 
 
 @pytest.mark.parametrize("user", USERS)
-def test_users_are_noticed_as_often_as_every_factor_says(rows: Rows, user: str) -> None:
+def test_users_are_noticed_as_often_as_every_factor_says(rows, user):
     looks, noticed = hits(rows, "misses", user)
     distance, bearing = from_eye(looks["true_x"], looks["true_y"])
     towards = bearing + HEADING_DEG + MOUNT_DEG
@@ -167,7 +167,7 @@ def test_users_are_noticed_as_often_as_every_factor_says(rows: Rows, user: str) 
     check_by(posture, [0.7, 0.95], noticed, share)
 
 
-def test_misses_come_in_runs_of_the_memory_in_seconds(rows: Rows) -> None:
+def test_misses_come_in_runs_of_the_memory_in_seconds(rows):
     looks, noticed = hits(rows, "keeps", "ana")
     assert agree(noticed[::50], 0.6)
     following = np.diff(looks["step"]) == 1
@@ -178,7 +178,7 @@ def test_misses_come_in_runs_of_the_memory_in_seconds(rows: Rows) -> None:
 
 
 @pytest.mark.parametrize("user", USERS)
-def test_users_are_taken_for_each_other_as_often_as_told_by_distance(rows: Rows, user: str) -> None:
+def test_users_are_taken_for_each_other_as_often_as_told_by_distance(rows, user):
     result = of(rows, "mistakes", true_user=user)
     distance, _ = from_eye(result["true_x"], result["true_y"])
     right = np.interp(distance, [0, 6], [0.9, 0.3])
@@ -194,7 +194,7 @@ def test_users_are_taken_for_each_other_as_often_as_told_by_distance(rows: Rows,
         check_by(distance, edges, taken, share)
 
 
-def test_positions_are_blurred_along_and_across_the_line_of_sight(rows: Rows) -> None:
+def test_positions_are_blurred_along_and_across_the_line_of_sight(rows):
     result = of(rows, "blurs")
     true, seen = (from_eye(result[f"{of}x"], result[f"{of}y"]) for of in ("true_", ""))
     along = (seen[0] - true[0]) / (0.04 + 0.02 * true[0])
@@ -221,9 +221,7 @@ ACTIVITIES = {
 
 
 @pytest.mark.parametrize(("column", "confusion"), [("posture", POSTURES), ("activity", ACTIVITIES)])
-def test_postures_and_activities_are_confused_as_told(
-    rows: Rows, column: str, confusion: dict[str, dict[str, float]]
-) -> None:
+def test_postures_and_activities_are_confused_as_told(rows, column, confusion):
     result = of(rows, "blurs")
     every = {name for others in confusion.values() for name in others}
     for true, others in confusion.items():
@@ -233,9 +231,7 @@ def test_postures_and_activities_are_confused_as_told(
             assert agree(mine == name, others.get(name, 0.0)), (true, name)
 
 
-def test_activities_are_true_at_the_look_and_unknown_to_cameras_that_do_not_tell_them(
-    folder: Path, rows: Rows
-) -> None:
+def test_activities_are_true_at_the_look_and_unknown_to_cameras_that_do_not_tell_them(folder, rows):
     events = table(observations(folder / "scenario.yaml")[1], "events", event="activity")
     for user in USERS:
         mine = events["entity"] == user
@@ -248,7 +244,7 @@ def test_activities_are_true_at_the_look_and_unknown_to_cameras_that_do_not_tell
         assert not any(isinstance(name, str) for name in of(rows, robot)["activity"])
 
 
-def test_false_positives_come_at_their_rate_where_and_as_whom_they_are_told(rows: Rows) -> None:
+def test_false_positives_come_at_their_rate_where_and_as_whom_they_are_told(rows):
     result = of(rows, "imagines")
     false = np.array([not isinstance(name, str) for name in result["true_user"]])
     x, y = result["x"][false], result["y"][false]
@@ -270,7 +266,7 @@ def test_false_positives_come_at_their_rate_where_and_as_whom_they_are_told(rows
     assert (real["user"] == "ana").all()
 
 
-def test_false_positives_of_a_camera_before_a_wall_come_at_their_rate(folder: Path) -> None:
+def test_false_positives_of_a_camera_before_a_wall_come_at_their_rate(folder):
     """Nearly all of what it could see is hidden: with 64 draws of a point, two of five failed."""
     robot = {
         "start": [0.6, 5.0], "start_heading_deg": 180,
@@ -287,7 +283,7 @@ def test_false_positives_of_a_camera_before_a_wall_come_at_their_rate(folder: Pa
     assert abs(count - 600) < 4.5 * np.sqrt(600)
 
 
-def test_looks_come_at_their_period_and_rows_after_their_latency(rows: Rows) -> None:
+def test_looks_come_at_their_period_and_rows_after_their_latency(rows):
     """6 s are 3 steps of 2 s; 5 s are rounded up to 3."""
     for user in USERS:
         looks, result = of(rows, "sharp", true_user=user), of(rows, "late", true_user=user)
@@ -297,7 +293,7 @@ def test_looks_come_at_their_period_and_rows_after_their_latency(rows: Rows) -> 
         assert looks["x"][due].tolist() == result["x"].tolist()
 
 
-def test_the_file_is_what_yaml_says_and_a_run_by_overrides_is_the_same(folder: Path) -> None:
+def test_the_file_is_what_yaml_says_and_a_run_by_overrides_is_the_same(folder):
     """A key of a perception can be set from the command line, in any unit."""
     content = yaml.safe_load(SCENARIO)
     del content["robots"]["blurs"]["perception"]["attributes"]["range_noise"]

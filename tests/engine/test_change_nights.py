@@ -56,7 +56,7 @@ def due(night: Night) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
-def test_schedule_door_log_and_expectation_are_in_local_time(night: Night, tmp_path: Path) -> None:
+def test_schedule_door_log_and_expectation_are_in_local_time(night, tmp_path):
     """Over forty time zones, and some in the year in which their rules changed."""
     log = tmp_path / "log.csv"
     # In UTC, a change at each 13th minute; it lands where it belongs.

@@ -54,7 +54,7 @@ def flat() -> dict[str, Any]:
 
 
 @pytest.fixture
-def plan(tmp_path: Any) -> str:
+def plan(tmp_path):
     import json
 
     path = tmp_path / "flat.json"
@@ -85,7 +85,7 @@ def changes_of(stored: fleet2d.Run) -> list[tuple[int, str | None, str]]:
     ]
 
 
-def test_shut_door_hides_who_is_behind_it_from_the_very_step_on(plan: str) -> None:
+def test_shut_door_hides_who_is_behind_it_from_the_very_step_on(plan):
     stored = run(
         home(
             plan,
@@ -100,7 +100,7 @@ def test_shut_door_hides_who_is_behind_it_from_the_very_step_on(plan: str) -> No
     assert [*range(10), *range(30, 60)] == seen
 
 
-def test_scenario_with_doors_is_the_same_for_every_span(plan: str) -> None:
+def test_scenario_with_doors_is_the_same_for_every_span(plan):
     content = home(
         plan,
         users={
@@ -140,7 +140,7 @@ def test_scenario_with_doors_is_the_same_for_every_span(plan: str) -> None:
         assert digests(whole) == digests(run(content, max_span=span))
 
 
-def test_person_opens_the_door_in_time_and_it_falls_shut_behind(plan: str) -> None:
+def test_person_opens_the_door_in_time_and_it_falls_shut_behind(plan):
     stored = run(
         home(
             plan,
@@ -178,7 +178,7 @@ def test_person_opens_the_door_in_time_and_it_falls_shut_behind(plan: str) -> No
     assert through + 3 <= shut <= through + 5
 
 
-def test_robot_waits_at_a_shut_door_and_goes_on_when_it_opens(plan: str) -> None:
+def test_robot_waits_at_a_shut_door_and_goes_on_when_it_opens(plan):
     stored = run(
         home(
             plan,
@@ -199,7 +199,7 @@ def test_robot_waits_at_a_shut_door_and_goes_on_when_it_opens(plan: str) -> None
     assert 300 < inside[0] < 330
 
 
-def test_robot_on_its_way_turns_back_at_a_door_that_shuts_before_it(plan: str) -> None:
+def test_robot_on_its_way_turns_back_at_a_door_that_shuts_before_it(plan):
     stored = run(
         home(
             plan,
@@ -217,7 +217,7 @@ def test_robot_on_its_way_turns_back_at_a_door_that_shuts_before_it(plan: str) -
     assert where["x"].max() < 4.05 - 0.15
 
 
-def test_door_waits_while_somebody_stands_in_it(plan: str) -> None:
+def test_door_waits_while_somebody_stands_in_it(plan):
     simulation = fleet2d.Simulation(
         home(
             plan,
@@ -230,7 +230,7 @@ def test_door_waits_while_somebody_stands_in_it(plan: str) -> None:
     assert frozenset() == simulation.home.shut
 
 
-def test_nobody_walks_through_a_locked_door(plan: str) -> None:
+def test_nobody_walks_through_a_locked_door(plan):
     stored = run(
         home(
             plan,
@@ -248,7 +248,7 @@ def test_nobody_walks_through_a_locked_door(plan: str) -> None:
     assert where["x"].max() > 4.1
 
 
-def test_moved_cart_ends_sight_where_it_stands_now(plan: str) -> None:
+def test_moved_cart_ends_sight_where_it_stands_now(plan):
     stored = run(
         home(
             plan,
@@ -265,7 +265,7 @@ def test_moved_cart_ends_sight_where_it_stands_now(plan: str) -> None:
     assert [*range(20), *range(40, 60)] == seen
 
 
-def test_paths_go_round_a_moved_cart(plan: str) -> None:
+def test_paths_go_round_a_moved_cart(plan):
     simulation = fleet2d.Simulation(home(plan, robots={"astro": stands(4.6, 1.45)}))
     simulation.do(MoveFurniture("cart", (6.0, 1.45), turn_deg=45))
     simulation.advance(1)
@@ -287,7 +287,7 @@ class Closer(Algorithm):
         return HomeChanges([HomeChange(shut="door")])
 
 
-def test_algorithm_shuts_a_door_at_the_step_after_its_update(plan: str) -> None:
+def test_algorithm_shuts_a_door_at_the_step_after_its_update(plan):
     stored = run(
         home(
             plan,
@@ -308,7 +308,7 @@ class Wrecker(Algorithm):
         return HomeChanges([HomeChange(open="gate")])
 
 
-def test_algorithm_that_opens_a_door_that_is_not_there_is_named(plan: str) -> None:
+def test_algorithm_that_opens_a_door_that_is_not_there_is_named(plan):
     content = home(
         plan,
         "5 min",
@@ -320,7 +320,7 @@ def test_algorithm_that_opens_a_door_that_is_not_there_is_named(plan: str) -> No
         run(content)
 
 
-def test_room_used_otherwise_is_found_by_its_new_type(plan: str) -> None:
+def test_room_used_otherwise_is_found_by_its_new_type(plan):
     simulation = fleet2d.Simulation(
         home(
             plan,
@@ -333,7 +333,7 @@ def test_room_used_otherwise_is_found_by_its_new_type(plan: str) -> None:
     assert ["bathroom_1"] == [room.name for room in ana.rooms(("office",))]
 
 
-def test_branches_change_on_their_own(plan: str) -> None:
+def test_branches_change_on_their_own(plan):
     simulation = fleet2d.Simulation(
         home(
             plan,
@@ -350,7 +350,7 @@ def test_branches_change_on_their_own(plan: str) -> None:
     assert branch.actors["ana"].home is branch.home
 
 
-def test_homes_without_doors_pay_nothing() -> None:
+def test_homes_without_doors_pay_nothing():
     simulation = fleet2d.Simulation(scenario("1 min"))
     assert simulation.home.walls is simulation.home.plan.mesh
 
@@ -387,9 +387,7 @@ def test_homes_without_doors_pay_nothing() -> None:
         ),
     ],
 )
-def test_change_or_door_that_can_not_be_is_refused(
-    plan: str, sections: dict[str, Any], message: str
-) -> None:
+def test_change_or_door_that_can_not_be_is_refused(plan, sections, message):
     content = home(
         plan,
         **{
@@ -402,7 +400,7 @@ def test_change_or_door_that_can_not_be_is_refused(
         fleet2d.Simulation(content)
 
 
-def test_track_crosses_a_line_at_the_moment_it_does() -> None:
+def test_track_crosses_a_line_at_the_moment_it_does():
     track = Breakpoints(
         np.array([0, 1000, 2000, 3000]),
         np.array([0, 100, 100, 0]),
@@ -418,7 +416,7 @@ def test_track_crosses_a_line_at_the_moment_it_does() -> None:
 @pytest.mark.parametrize(
     ("word", "kind"), [("Arbeitszimmer", "office"), ("Living Room", "living_room")]
 )
-def test_a_room_is_used_as_what_a_word_usually_means(plan: str, word: str, kind: str) -> None:
+def test_a_room_is_used_as_what_a_word_usually_means(plan, word, kind):
     simulation = fleet2d.Simulation(
         home(plan, script=[{"at": "1 s", "room": "kitchen_1", "type": word}])
     )

@@ -41,7 +41,7 @@ def switched(stored: Any, kind: str) -> tuple[list[int], list[str]]:
     return rows["step"].tolist(), rows["detail"].tolist()
 
 
-def test_lights_off_people_in_the_room_are_noticed_a_fifth_as_often() -> None:
+def test_lights_off_people_in_the_room_are_noticed_a_fifth_as_often():
     stored = watched(
         {"at": "22:05", "lights": "kitchen", "turn": "off"},
         {"at": "22:15", "lights": "kitchen_1", "turn": "on"},
@@ -53,13 +53,13 @@ def test_lights_off_people_in_the_room_are_noticed_a_fifth_as_often() -> None:
     assert (off, on) == (switched(stored, "light_off"), switched(stored, "light_on"))
 
 
-def test_lights_of_other_rooms_and_of_a_room_by_daylight_change_nothing() -> None:
+def test_lights_of_other_rooms_and_of_a_room_by_daylight_change_nothing():
     off = {"at": "0 s", "lights": "all", "turn": "off"}
     assert seen(watched({**off, "lights": "bedroom"}), "22:00", "22:20") == 1200
     assert seen(watched(off, simulation={"start": "2026-01-05T12:00"}), "22:00", "22:20") == 1200
 
 
-def test_how_much_a_camera_misses_in_the_dark_is_its_own() -> None:
+def test_how_much_a_camera_misses_in_the_dark_is_its_own():
     off = {"at": "0 s", "lights": "kitchen", "turn": "off"}
     blind = {"perception": {"detection": {"unlit": 0.0}}}
     assert seen(watched(off, astro=blind), "22:00", "22:20") == 0
@@ -91,7 +91,7 @@ def people(**simulation: Any) -> dict[str, Any]:
     )
 
 
-def test_people_have_the_light_on_where_they_are_awake_and_off_where_they_leave() -> None:
+def test_people_have_the_light_on_where_they_are_awake_and_off_where_they_leave():
     """Ben, for whom it isn't dark before 22:20, leaves the light on that Ana switched on."""
     simulation = fleet2d.Simulation(people())
     simulation.run_until("22:03")
@@ -105,7 +105,7 @@ def test_people_have_the_light_on_where_they_are_awake_and_off_where_they_leave(
     assert "kitchen_1" not in {room for _, room in off}, "Ben is still there"
 
 
-def test_people_sleep_in_the_dark_and_lie_in_the_light_after_a_fall() -> None:
+def test_people_sleep_in_the_dark_and_lie_in_the_light_after_a_fall():
     home = {"type": "bundled", "furnish": True}
     evening = {"start": "2026-01-05T21:00", "duration": "3 h", "seed": 4}
     ana = {"type": "routine", "persona": "works_outside", "lights": "17:00-08:00"}
@@ -122,7 +122,7 @@ def test_people_sleep_in_the_dark_and_lie_in_the_light_after_a_fall() -> None:
     assert len(simulation.home.unlit) == len(simulation.home.rooms)
 
 
-def test_lights_are_switched_by_hand_and_a_note_says_where_events_are_not_stored() -> None:
+def test_lights_are_switched_by_hand_and_a_note_says_where_events_are_not_stored():
     simulation = fleet2d.Simulation(people())
     simulation.run_until("22:10")
     simulation.do(SwitchLights("kitchen", "off"))
@@ -134,7 +134,7 @@ def test_lights_are_switched_by_hand_and_a_note_says_where_events_are_not_stored
     assert any("announce them, like script:" in note for note in stored.manifest["notes"])
 
 
-def test_lights_are_the_same_for_every_span_and_after_resuming(tmp_path: Any) -> None:
+def test_lights_are_the_same_for_every_span_and_after_resuming(tmp_path):
     whole = digests(run(people()))
     assert whole == digests(run(people(max_span=7)))
     simulation = fleet2d.Simulation(people())
@@ -143,7 +143,7 @@ def test_lights_are_the_same_for_every_span_and_after_resuming(tmp_path: Any) ->
     assert whole == digests(fleet2d.Simulation.load(tmp_path / "half").run())
 
 
-def test_light_of_a_room_or_kind_is_an_expectation() -> None:
+def test_light_of_a_room_or_kind_is_an_expectation():
     stored = watched(
         {"at": "22:05", "lights": "kitchen", "turn": "off"},
         expect={
@@ -164,7 +164,7 @@ def test_light_of_a_room_or_kind_is_an_expectation() -> None:
         ({"lights": "kitchen", "turn": "dim"}, "turn"),
     ],
 )
-def test_unknown_rooms_and_turns_are_refused(change: dict[str, str], message: str) -> None:
+def test_unknown_rooms_and_turns_are_refused(change, message):
     with pytest.raises(InputError, match=message):
         watched({"at": "22:05", **change})
 
@@ -174,9 +174,7 @@ DARK_AT = "19:00"
 
 
 @pytest.mark.parametrize(("start", "least", "most"), [("06-21", 1200, 1200), ("12-21", 150, 330)])
-def test_with_daylight_the_season_decides_how_dark_an_unlit_room_is(
-    start: str, least: int, most: int
-) -> None:
+def test_with_daylight_the_season_decides_how_dark_an_unlit_room_is(start, least, most):
     off = {"at": "0 s", "lights": "all", "turn": "off"}
     place = {"start": f"2026-{start}T{DARK_AT}", "daylight": {"latitude": 52.5}}
     stored = watched(off, simulation=place)
@@ -184,7 +182,7 @@ def test_with_daylight_the_season_decides_how_dark_an_unlit_room_is(
     assert least <= seen(stored, "22:00", "22:20") <= most
 
 
-def test_a_curve_of_ones_own_goes_before_daylight() -> None:
+def test_a_curve_of_ones_own_goes_before_daylight():
     off = {"at": "0 s", "lights": "all", "turn": "off"}
     place = {"start": f"2026-12-21T{DARK_AT}", "daylight": {"latitude": 52.5}}
     blind = {"perception": {"detection": {"unlit": 0.0}}}
@@ -193,13 +191,13 @@ def test_a_curve_of_ones_own_goes_before_daylight() -> None:
 
 
 @pytest.mark.parametrize(("day", "expected"), [("06-21", []), ("12-21", [1])])
-def test_lights_in_the_dark_are_on_from_sunset_to_sunrise(day: str, expected: list[int]) -> None:
+def test_lights_in_the_dark_are_on_from_sunset_to_sunrise(day, expected):
     place = {"start": f"2026-{day}T{DARK_AT}", "daylight": {"latitude": 52.5}}
 
     assert expected == switched(watched(ana={"lights": "dark"}, simulation=place), "light_on")[0]
 
 
-def test_a_light_goes_on_at_sunset() -> None:
+def test_a_light_goes_on_at_sunset():
     """In Berlin's winter, at 15:54 and some seconds."""
     place = {"start": "2026-12-21T15:50", "daylight": {"latitude": 52.52, "noon": "12:06:23"}}
     steps, rooms = switched(watched(ana={"lights": "dark"}, simulation=place), "light_on")
@@ -207,14 +205,14 @@ def test_a_light_goes_on_at_sunset() -> None:
     assert (["kitchen_1"], True) == (rooms, 180 < steps[0] < 300)
 
 
-def test_lights_in_the_dark_need_a_place() -> None:
+def test_lights_in_the_dark_need_a_place():
     with pytest.raises(InputError, match=r"lights.*simulation\.daylight"):
         watched(ana={"lights": "dark"})
     with pytest.raises(InputError, match=r"lights.*17:00-08:00', or dark"):
         watched(ana={"lights": "darkness"})
 
 
-def test_runs_by_daylight_are_the_same_for_every_span_and_from_their_manifest() -> None:
+def test_runs_by_daylight_are_the_same_for_every_span_and_from_their_manifest():
     content = people(daylight={"latitude": 52.5})
     content["users"]["ana"]["lights"] = "dark"
     expected = digests(run(content))

@@ -37,7 +37,7 @@ def gives_way(stored: Any) -> list[tuple[int, str, str]]:
     return list(zip(rows["step"], rows["entity"], rows["detail"], strict=True))
 
 
-def test_somebody_waits_before_a_body_and_then_goes_round_it() -> None:
+def test_somebody_waits_before_a_body_and_then_goes_round_it():
     users = {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [2.5, 3]}}
     stored = assert_same_for_every_max_span(home(users=users), 61, 7, 1)
     ana = path(stored, "ana")
@@ -49,7 +49,7 @@ def test_somebody_waits_before_a_body_and_then_goes_round_it() -> None:
     assert 3 == len(stands[ana.x[stands] < 2.5])
 
 
-def test_without_it_bodies_are_air() -> None:
+def test_without_it_bodies_are_air():
     users = {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [3, 3]}}
     stored = run(home(block={}, users=users))
 
@@ -57,7 +57,7 @@ def test_without_it_bodies_are_air() -> None:
     assert gap(stored).min() == 0
 
 
-def test_somebody_who_is_gone_in_time_is_only_waited_for() -> None:
+def test_somebody_who_is_gone_in_time_is_only_waited_for():
     """Ben crosses the way: ana stands for a moment, goes on, and is as late."""
     users = {
         "ana": walker([1, 3], [4, 3], 60.0),
@@ -73,7 +73,7 @@ def test_somebody_who_is_gone_in_time_is_only_waited_for() -> None:
 
 
 @pytest.mark.parametrize("starts", [(0.5, 4.5), (0.9, 4.1)], ids=["one waits first", "both wait"])
-def test_of_two_who_meet_the_first_one_goes_round(starts: tuple[float, float]) -> None:
+def test_of_two_who_meet_the_first_one_goes_round(starts):
     users = {
         "ana": walker([starts[0], 3], [4.5, 3], 60.0),
         "ben": walker([starts[1], 3], [0.5, 3], 60.0, start_heading_deg=180),
@@ -87,7 +87,7 @@ def test_of_two_who_meet_the_first_one_goes_round(starts: tuple[float, float]) -
     assert (4.5, 0.5) == pytest.approx((ana.x[-1], ben.x[-1]), abs=1e-3)
 
 
-def test_where_there_is_no_way_round_one_squeezes_past() -> None:
+def test_where_there_is_no_way_round_one_squeezes_past():
     """Ben stands in the doorway, too wide to be passed."""
     users = {"ana": walker([3.05, 3.1], [7.05, 3.1], 60.0)}
     users["ben"] = {"start": [5.05, 3.1], "radius": 0.3}
@@ -98,7 +98,7 @@ def test_where_there_is_no_way_round_one_squeezes_past() -> None:
     assert path(stored, "ana").x[-1] == pytest.approx(7.05, abs=1e-3)
 
 
-def test_where_somebody_stands_already_one_stops_beside() -> None:
+def test_where_somebody_stands_already_one_stops_beside():
     users = {"ana": walker([1, 3], [3, 3], 60.0), "ben": {"start": [3, 3]}}
     stored = assert_same_for_every_max_span(home(users=users), 7, 1)
 
@@ -106,7 +106,7 @@ def test_where_somebody_stands_already_one_stops_beside() -> None:
     assert gap(stored).min() >= 0.4
 
 
-def test_what_was_to_come_later_comes_in_time_after_a_rest() -> None:
+def test_what_was_to_come_later_comes_in_time_after_a_rest():
     """The wait shortens the next stay, so that the plan is in time again."""
     users = {
         "ana": walker([1, 3], [4, 3], 20.0, [4, 1], 60.0),
@@ -119,7 +119,7 @@ def test_what_was_to_come_later_comes_in_time_after_a_rest() -> None:
     assert (path(stored, "ana").y[20:] == alone.y[20:]).all()
 
 
-def test_robots_wait_for_each_other_and_for_people() -> None:
+def test_robots_wait_for_each_other_and_for_people():
     robots = {
         "astro": walker([1, 3], [4, 3], 60.0, radius=0.15),
         "bolt": {"start": [2.5, 3], "start_heading_deg": 0},
@@ -136,14 +136,14 @@ def test_robots_wait_for_each_other_and_for_people() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("span", some([1, 61], 2))
-def test_spans_do_not_show_where_bodies_block_each_other(span: int) -> None:
+def test_spans_do_not_show_where_bodies_block_each_other(span):
     content = everything("40 min")
     content["simulation"] |= BLOCK
 
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
-def test_in_a_crowd_bodies_overlap_less_often() -> None:
+def test_in_a_crowd_bodies_overlap_less_often():
     users = {name: {"type": "meander", "speed": 0.7} for name in ("ana", "ben", "cleo", "dora")}
     blocked, free = (run(home("40 min", block, users=users)) for block in (BLOCK, {}))
     seconds = [
@@ -154,7 +154,7 @@ def test_in_a_crowd_bodies_overlap_less_often() -> None:
     assert seconds[0] * 5 < seconds[1]
 
 
-def test_a_family_lives_its_day() -> None:
+def test_a_family_lives_its_day():
     """Seats, beds, doors and needs: nobody gets stuck, and days go on as they were planned."""
     member = {
         "type": "routine",
@@ -181,7 +181,7 @@ def test_a_family_lives_its_day() -> None:
 
 
 @pytest.mark.parametrize("step", ["250 ms", "2 s"])
-def test_steps_of_any_length_and_copies_give_the_same(step: str) -> None:
+def test_steps_of_any_length_and_copies_give_the_same(step):
     users = {name: {"type": "meander", "speed": 0.7} for name in ("ana", "ben", "cleo")}
     robots = {
         "astro": {

@@ -45,7 +45,7 @@ def gap(stored: Any) -> Any:
     return np.hypot(one.x - other.x, one.y - other.y)
 
 
-def test_it_waits_before_somebody_and_then_goes_round() -> None:
+def test_it_waits_before_somebody_and_then_goes_round():
     stored = assert_same_for_every_max_span(polite(stands(3.0, 3.2)), 61, 7, 1)
     assert "gives_way" in names(stored)
     assert gap(stored).min() > 0.35
@@ -54,17 +54,17 @@ def test_it_waits_before_somebody_and_then_goes_round() -> None:
     assert astro.x[400:].min() < 1.1
 
 
-def test_without_it_the_robot_drives_through_people() -> None:
+def test_without_it_the_robot_drives_through_people():
     assert gap(run(home_with([TO_AND_FRO], "10 min", stands(3.0, 3.5)))).min() < 0.35
 
 
-def test_it_comes_no_nearer_while_it_is_patient() -> None:
+def test_it_comes_no_nearer_while_it_is_patient():
     stored = run(polite(stands(2.8, 3.5), patience="1 h"))
     assert gap(stored).min() >= KEPT - 0.01
     assert 1 == names(stored).count("gives_way")
 
 
-def test_it_lets_somebody_through_a_door_and_goes_on_with_its_round() -> None:
+def test_it_lets_somebody_through_a_door_and_goes_on_with_its_round():
     walker = {
         "type": "tests.own_components:Scripted",
         "start": [7.0, 3.1],
@@ -84,7 +84,7 @@ def test_it_lets_somebody_through_a_door_and_goes_on_with_its_round() -> None:
     assert "kitchen_1" in rooms(stored, 25)
 
 
-def test_steps_of_any_length_and_copies_give_the_same() -> None:
+def test_steps_of_any_length_and_copies_give_the_same():
     import copy
 
     content = polite("meander", [{"type": "find", "every": "2 min", "deadline": "1 min"}, "patrol"])
@@ -110,7 +110,7 @@ def own_approaches(stored: Any, user: str = "ana") -> Any:
     [["meander"], [TO_AND_FRO], ["opportunistic", "patrol"], ["follow", "patrol"]],
     ids=["meander", "patrol", "opportunistic", "follow"],
 )
-def test_it_never_drives_into_anybody_in_a_crowd(behaviors: list[Any]) -> None:
+def test_it_never_drives_into_anybody_in_a_crowd(behaviors):
     content = polite("meander", behaviors, "40 min")
     stored = assert_same_for_every_max_span(content, 61)
     assert "gives_way" in names(stored)
@@ -119,7 +119,7 @@ def test_it_never_drives_into_anybody_in_a_crowd(behaviors: list[Any]) -> None:
     assert own_approaches(rude).min() < 0.35
 
 
-def test_it_never_drives_into_anybody_for_days_in_a_furnished_home() -> None:
+def test_it_never_drives_into_anybody_for_days_in_a_furnished_home():
     member = {
         "type": "routine",
         "household": {"members": {"ana": "works_from_home", "ben": "retired"}},
@@ -144,7 +144,7 @@ IN_THE_DOOR = {"type": "tests.own_components:Scripted", "start": [5.05, 3.1], "s
 
 
 @pytest.mark.parametrize(("stays", "gives_up"), [(60.0, False), (1200.0, True)])
-def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays: float, gives_up: bool) -> None:
+def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays, gives_up):
     patrol = {**TO_AND_FRO, "waypoints": [[2.0, 3.1], [7.0, 3.1], [1.0, 6.0]]}
     ana = {**IN_THE_DOOR, "script": [stays, [7.0, 1.0], 1200.0]}
     stored = assert_same_for_every_max_span(polite(ana, [patrol], "10 min"), 61, 1)
@@ -157,7 +157,7 @@ def test_it_waits_at_a_door_and_gives_up_where_nobody_moves(stays: float, gives_
         assert 120 <= steps[1] - steps[0] <= 133  # it looks ever more seldom
 
 
-def test_a_place_that_is_taken_is_left_alone_until_it_thinks_again() -> None:
+def test_a_place_that_is_taken_is_left_alone_until_it_thinks_again():
     hangout = {"type": "hangout", "source": "rtp", "explore": 0, "period": "30 min"}
     content = polite(OUT, [hangout], "2 h", gives_up="1 min")
     content |= belief(bathroom_1=1)
@@ -170,7 +170,7 @@ def test_a_place_that_is_taken_is_left_alone_until_it_thinks_again() -> None:
     assert gap(stored).min() > 0.4
 
 
-def test_a_look_that_was_held_up_counts_as_one() -> None:
+def test_a_look_that_was_held_up_counts_as_one():
     """Find looks on elsewhere, though it waited for somebody on the way."""
     find = {"type": "find", "user": "ben", "at": ["07:01"], "deadline": "8 min"}
     still = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "1 d", "look_around": False}
@@ -187,13 +187,13 @@ def visited(stored: Any) -> set[str]:
     return {stored.plan.rooms[room].name for room in set(poses.room.tolist()) if room >= 0}
 
 
-def test_key_frames_tell_the_same_as_the_poses() -> None:
+def test_key_frames_tell_the_same_as_the_poses():
     content = polite("meander", ["patrol"], "20 min")
     poses, rows = path(run(content), "astro"), each_step(content, "astro")
     assert np.abs(poses.x - rows["x"]).max() < 1e-3
 
 
-def test_events_at_the_begin_of_a_plan_are_told_though_it_waits() -> None:
+def test_events_at_the_begin_of_a_plan_are_told_though_it_waits():
     find = {"type": "find", "user": "ben", "at": ["07:02"], "deadline": "2 min"}
     still = {"type": "patrol", "waypoints": [[3.0, 3.5]], "dwell": "1 d", "look_around": False}
     content = polite(stands(3.6, 3.5), [find, still], patience="1 min")
@@ -203,7 +203,7 @@ def test_events_at_the_begin_of_a_plan_are_told_though_it_waits() -> None:
     assert ["find_begins", "gave_up"] == [n for n in names(stored) if n != "gives_way"]
 
 
-def test_robots_that_do_not_give_way_are_as_they_were() -> None:
+def test_robots_that_do_not_give_way_are_as_they_were():
     content = everything("20 min")
     content["simulation"]["ghosts"] = True
     before = run(content)
@@ -222,6 +222,6 @@ def test_robots_that_do_not_give_way_are_as_they_were() -> None:
         ({"politeness": 1}, "unknown key"),
     ],
 )
-def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+def test_bad_settings_are_refused(fields, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(polite("meander", **fields))

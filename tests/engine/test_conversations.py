@@ -29,7 +29,7 @@ def rooms_of(run: fleet2d.Run, body: str) -> list[str]:
     return [str(room) for room in rows["room"][rows["entity"] == body]]
 
 
-def test_a_ban_ends() -> None:
+def test_a_ban_ends():
     users = {"ana": ana("bedroom", ("banned",))}
     users["ana"]["answers"] = Scripted(outcomes=("banned",), bans_for="30 min")
     run = fleet2d.run(home("3 h", users=users))
@@ -41,7 +41,7 @@ def test_a_ban_ends() -> None:
     assert "bedroom_1" in rooms_of(run, "astro")[allowed:]
 
 
-def test_who_sends_the_robot_away_is_left_alone_for_a_while() -> None:
+def test_who_sends_the_robot_away_is_left_alone_for_a_while():
     users = {"ana": ana("kitchen", ("sent_away",))}
     users["ana"]["answers"] = Scripted(outcomes=("sent_away",), away_for="20 min")
     behaviors = [{"type": "opportunistic", "again": "1 min"}, {"type": "patrol"}]
@@ -53,7 +53,7 @@ def test_who_sends_the_robot_away_is_left_alone_for_a_while() -> None:
     assert [step for step in approached if step > away + 1200]
 
 
-def test_a_parcel_is_fetched_from_one_and_brought_to_the_other() -> None:
+def test_a_parcel_is_fetched_from_one_and_brought_to_the_other():
     users = {"ana": ana(), "ben": ana("bedroom")}
     run = fleet2d.run(home(users=users, interactions={"parcel": PARCEL}))
 
@@ -63,7 +63,7 @@ def test_a_parcel_is_fetched_from_one_and_brought_to_the_other() -> None:
     ] == told(run, "due", "asks", "collects", "delivered", "expired")  # fmt: skip
 
 
-def test_a_parcel_that_is_not_handed_over_is_not_delivered() -> None:
+def test_a_parcel_that_is_not_handed_over_is_not_delivered():
     users = {"ana": ana(), "ben": ana("bedroom", ("declined",))}
     run = fleet2d.run(home(users=users, interactions={"parcel": PARCEL}))
 
@@ -73,7 +73,7 @@ def test_a_parcel_that_is_not_handed_over_is_not_delivered() -> None:
 @pytest.mark.parametrize(
     "wrong", [{"do": "offer"}, {"fetch_from": "ana"}], ids=["not a delivery", "to oneself"]
 )
-def test_objects_are_fetched_for_deliveries_only(wrong: dict[str, str]) -> None:
+def test_objects_are_fetched_for_deliveries_only(wrong):
     with pytest.raises(ScenarioError, match="'fetch_from' is for `do: deliver`"):
         fleet2d.run(home(interactions={"parcel": PARCEL | wrong}))
 
@@ -82,7 +82,7 @@ def person_who(**rates: float) -> dict[str, Any]:
     return ana() | {"answers": {"initiative": rates}}
 
 
-def test_people_call_robots_which_come() -> None:
+def test_people_call_robots_which_come():
     behaviors = [{"type": "interact"}, {"type": "come", "stay": "1 min"}, {"type": "patrol"}]
     content = home("3 h", users={"ana": person_who(calls=24)}, metrics={"interactions": {}})
     content["robots"] = {"astro": {"behaviors": behaviors}}
@@ -94,7 +94,7 @@ def test_people_call_robots_which_come() -> None:
     assert len(called) == run.metrics["interactions"]["astro"]["ana"]["called"]
 
 
-def test_questions_near_by_are_replied_to() -> None:
+def test_questions_near_by_are_replied_to():
     run = fleet2d.run(home("3 h", users={"ana": person_who(questions=48)}))
     asked = [step for step, _ in events_of(run, "question")]
     replies = [step for step, _ in events_of(run, "replies")]
@@ -104,7 +104,7 @@ def test_questions_near_by_are_replied_to() -> None:
     assert all(any(0 < reply - step < 15 for step in asked) for reply in replies)
 
 
-def test_annoyed_people_send_robots_away_that_asked_nothing() -> None:
+def test_annoyed_people_send_robots_away_that_asked_nothing():
     person = person_who(complaints=1000)
     person["answers"] |= {"sends_away_at": -1, "away_for": "5 min"}
     robots = {"astro": {"behaviors": [{"type": "patrol"}]}}
@@ -117,7 +117,7 @@ def test_annoyed_people_send_robots_away_that_asked_nothing() -> None:
         assert "kitchen_1" not in rooms_of(run, "astro")[step + 20 : step + 300]
 
 
-def test_who_has_had_enough_switches_the_robot_off_for_good() -> None:
+def test_who_has_had_enough_switches_the_robot_off_for_good():
     person = person_who(complaints=1000)
     person["answers"] |= {"sends_away_at": -1, "away_for": "5 s", "off_for": "5 min"}
     robots = {"astro": {"behaviors": [{"type": "patrol"}]}}
@@ -136,9 +136,7 @@ def test_who_has_had_enough_switches_the_robot_off_for_good() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["leaving", "fading"])
-def test_a_life_with_a_pushy_robot_ends_in_days_rather_than_in_a_thousand_quarrels(
-    kind: str,
-) -> None:
+def test_a_life_with_a_pushy_robot_ends_in_days_rather_than_in_a_thousand_quarrels(kind):
     """One who `leaves` switched it off 42 times in 60 days; another sent it away 893 times."""
     pushy = {
         "medicine": {"do": "remind", "to": "ana", "at": ["08:00"], "within": "2 h", "worth": 5},
@@ -162,7 +160,7 @@ def test_a_life_with_a_pushy_robot_ends_in_days_rather_than_in_a_thousand_quarre
 
 
 @pytest.mark.parametrize("max_span", some([7, 1], 2))
-def test_spans_are_invisible_to_what_people_start(max_span: int) -> None:
+def test_spans_are_invisible_to_what_people_start(max_span):
     person = person_who(questions=200, complaints=500)
     person["answers"] |= {"sends_away_at": 0.1, "away_for": "2 min"}
     content = home("25 min", users={"ana": person})
@@ -171,12 +169,12 @@ def test_spans_are_invisible_to_what_people_start(max_span: int) -> None:
     assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))
 
 
-def test_calls_of_a_robot_that_can_not_come_are_refused() -> None:
+def test_calls_of_a_robot_that_can_not_come_are_refused():
     with pytest.raises(ScenarioError, match=r"initiative\.calls: none of the behaviors of astro"):
         fleet2d.run(home(users={"ana": person_who(calls=1)}))
 
 
-def test_expectations_know_the_details_of_requests() -> None:
+def test_expectations_know_the_details_of_requests():
     def expecting(detail: str) -> dict[str, Any]:
         accepted = f"events(accepted, astro, detail={detail!r})"
         text = f"after(events(due, astro, detail='pill ana'), {accepted}, within=30 min)"
@@ -192,7 +190,7 @@ SHORT = {**PILL, "within": "1 min"}
 
 
 @pytest.mark.parametrize("max_span", [7, 600])
-def test_spans_are_invisible_to_requests_that_nothing_waits_for(max_span: int) -> None:
+def test_spans_are_invisible_to_requests_that_nothing_waits_for(max_span):
     content = home("30 min", robots=STANDS, interactions={"pill": SHORT})
     content["metrics"] = {"interactions": {}}
     other = {**content, "simulation": {**content["simulation"], "max_span": max_span}}
@@ -202,7 +200,7 @@ def test_spans_are_invisible_to_requests_that_nothing_waits_for(max_span: int) -
     assert digests(run) == digests(fleet2d.run(other))
 
 
-def test_who_waits_for_a_request_to_expire_is_told_at_its_deadline() -> None:
+def test_who_waits_for_a_request_to_expire_is_told_at_its_deadline():
     run = fleet2d.Simulation(home("30 min", robots=STANDS, interactions={"pill": SHORT}))
     event = run.run_until(event="expired", entity="astro")
 

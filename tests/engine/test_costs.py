@@ -51,7 +51,7 @@ def on_the_rug(stored: Any, name: str = "astro", margin: float = 0.0) -> Bool:
     return inside
 
 
-def test_robot_crosses_a_no_go_area_only_without_a_costmap(tmp_path: Path) -> None:
+def test_robot_crosses_a_no_go_area_only_without_a_costmap(tmp_path):
     without, forbidden, dear = (
         run(flat_with_a_rug(tmp_path, costmap))
         for costmap in (None, {}, {"no_go": "cost", "clearance": 0, "no_go_cost": 5})
@@ -63,7 +63,7 @@ def test_robot_crosses_a_no_go_area_only_without_a_costmap(tmp_path: Path) -> No
     assert on_the_rug(dear).sum() > 50
 
 
-def test_spots_that_are_drawn_in_a_room_are_never_where_no_way_leads(tmp_path: Path) -> None:
+def test_spots_that_are_drawn_in_a_room_are_never_where_no_way_leads(tmp_path):
     robot = {"type": "patrol", "rooms": ["living_room"], "dwell": "1 s", "start": [1, 3]}
     spots = {"type": f"{TESTS.as_posix()}/engine/test_costs:Hop", "start": [1, 3]}
     content = flat_with_a_rug(tmp_path, {}, robots={"astro": spots, "bolt": {**robot}})
@@ -73,7 +73,7 @@ def test_spots_that_are_drawn_in_a_room_are_never_where_no_way_leads(tmp_path: P
     assert not on_the_rug(stored, "bolt").any()
 
 
-def test_users_walk_where_robots_may_not(tmp_path: Path) -> None:
+def test_users_walk_where_robots_may_not(tmp_path):
     user = {"type": f"{HERE}:Hop", "start": [1, 3]}
     content = flat_with_a_rug(tmp_path, {}, users={"ana": user}, robots={})
 
@@ -81,7 +81,7 @@ def test_users_walk_where_robots_may_not(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_robot_follows_costs_that_an_algorithm_changes(tmp_path: Path) -> None:
+def test_robot_follows_costs_that_an_algorithm_changes(tmp_path):
     bar = {"bar": {"type": f"{HERE}:Bar", "period": "5 min"}}
     content = flat_with_a_rug(tmp_path, {}, algorithms=bar)
     content["robots"]["astro"] = {"type": f"{HERE}:Hop", "start": [1.0, 3.0]}
@@ -99,7 +99,7 @@ def test_robot_follows_costs_that_an_algorithm_changes(tmp_path: Path) -> None:
     assert stored.digest == twin.run().digest == simulation.run().digest
 
 
-def test_patrol_leaves_out_what_costs_close_and_waits_where_nothing_is_left(tmp_path: Path) -> None:
+def test_patrol_leaves_out_what_costs_close_and_waits_where_nothing_is_left(tmp_path):
     bar = {"bar": {"type": f"{HERE}:Bar", "period": "5 min"}}
     only = {"type": "patrol", "waypoints": [[7.0, 3.0]], "dwell": "5 s", "start": [7, 3]}
     content = flat_with_a_rug(tmp_path, {}, algorithms=bar)
@@ -114,7 +114,7 @@ def test_patrol_leaves_out_what_costs_close_and_waits_where_nothing_is_left(tmp_
     assert len(xs) == 25 * 60
 
 
-def test_costmap_is_stored_when_the_scenario_asks_for_it(tmp_path: Path) -> None:
+def test_costmap_is_stored_when_the_scenario_asks_for_it(tmp_path):
     content = flat_with_a_rug(tmp_path, {"clearance": "40 cm"})
     content["floorplan"]["layers"] = {"costmap": {}}
     stored = run(content)
@@ -125,7 +125,7 @@ def test_costmap_is_stored_when_the_scenario_asks_for_it(tmp_path: Path) -> None
     assert 150 < costs[stored.plan.free].max() <= 200
 
 
-def test_run_without_a_costmap_is_the_run_before() -> None:
+def test_run_without_a_costmap_is_the_run_before():
     content = everything("10 min")
     costed = copy.deepcopy(content)
     costed["floorplan"]["costmap"] = {"clearance": 0, "wall_cost": 0, "no_go": "ignore"}
@@ -143,14 +143,12 @@ def test_run_without_a_costmap_is_the_run_before() -> None:
         ({"robots": {"astro": {"start": [3.5, 3.0]}}}, "costmap lets no route pass"),
     ],
 )
-def test_place_where_no_way_leads_is_an_error_that_says_so(
-    tmp_path: Path, change: dict[str, Any], why: str
-) -> None:
+def test_place_where_no_way_leads_is_an_error_that_says_so(tmp_path, change, why):
     with pytest.raises(InputError, match=why):
         Simulation(flat_with_a_rug(tmp_path, {}, **change))
 
 
-def test_costmap_that_leaves_no_place_is_an_error(tmp_path: Path) -> None:
+def test_costmap_that_leaves_no_place_is_an_error(tmp_path):
     document = flat_document()
     document["no_go"] = [[[-1, -1], [20, -1], [20, 20], [-1, 20]]]
     (tmp_path / "all.json").write_text(json.dumps(document))

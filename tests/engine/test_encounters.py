@@ -82,9 +82,7 @@ class Given(Bodies):
 
 @settings(max_examples=examples(80))
 @given(meeting=meetings(), cuts=st.lists(st.integers(1, 7), max_size=40))
-def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(
-    meeting: list[tuple[int, int, bool]], cuts: list[int]
-) -> None:
+def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(meeting, cuts):
     users, robots = _bodies()
     encounters = Encounters(users, robots)
     # In the middle of the living room; the robot comes along its long side.
@@ -127,7 +125,7 @@ def _bodies() -> tuple[list[Any], list[Any]]:
     return _ACTORS[:1], _ACTORS[1:]
 
 
-def test_nobody_is_watched_who_does_not_react() -> None:
+def test_nobody_is_watched_who_does_not_react():
     _, robots = _bodies()
     quiet = Simulation(scenario(users={"ana": {"type": "meander"}})).actors["ana"]
     encounters = Encounters([quiet], robots)

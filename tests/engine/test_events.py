@@ -83,7 +83,7 @@ def whole_run(**simulation: Any) -> Any:
 
 
 @pytest.fixture(scope="module")
-def whole() -> Any:
+def whole():
     return whole_run()
 
 
@@ -100,9 +100,7 @@ ROBOTS = ("astro", "bolt", "curio", "drift", "ego")
     ("name", "events"),
     [("sights", {"user_seen", "user_lost"}), ("notes", {"reacts"}), ("lives", set())],
 )
-def test_an_algorithm_is_updated_at_the_steps_of_its_events(
-    whole: Any, name: str, events: set[str]
-) -> None:
+def test_an_algorithm_is_updated_at_the_steps_of_its_events(whole, name, events):
     expected = steps_of(whole, events, ROBOTS)
     if not events:  # of users, whom algorithms don't hear
         assert name not in whole.tables
@@ -114,7 +112,7 @@ def test_an_algorithm_is_updated_at_the_steps_of_its_events(
     assert all(set(now.split()) & events for now in rows["now"])
 
 
-def test_readings_of_sensors_are_events(whole: Any) -> None:
+def test_readings_of_sensors_are_events(whole):
     expected = np.unique(table(whole, "sensors")["step"]).tolist()
     rows = table(whole, "algorithms_sensors")
     assert len(expected) > 3
@@ -122,7 +120,7 @@ def test_readings_of_sensors_are_events(whole: Any) -> None:
     assert (rows["said"] > 0).all()
 
 
-def test_histories_join_without_gaps_from_update_to_update(whole: Any) -> None:
+def test_histories_join_without_gaps_from_update_to_update(whole):
     rows = table(whole, "some")
     assert [0, *rows["end"][:-1]] == rows["first"].tolist()
     assert (rows["step"] + 1).tolist() == rows["end"].tolist()
@@ -130,7 +128,7 @@ def test_histories_join_without_gaps_from_update_to_update(whole: Any) -> None:
     assert (seen < rows["end"][-1]).sum() == rows["seen"].sum()
 
 
-def test_metrics_hear_of_users_and_get_the_rest_at_the_end(whole: Any) -> None:
+def test_metrics_hear_of_users_and_get_the_rest_at_the_end(whole):
     expected = steps_of(whole, {"activity"}, ("ana", "ben"))
     expected = sorted({*expected, *steps_of(whole, {"obeys"}, ROBOTS)})
     assert [*expected, 1799] == whole.metrics["diary"]["steps"]
@@ -138,13 +136,13 @@ def test_metrics_hear_of_users_and_get_the_rest_at_the_end(whole: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("span", some([1, 7, 600], 2))
-def test_events_are_the_same_for_every_max_span(whole: Any, span: int) -> None:
+def test_events_are_the_same_for_every_max_span(whole, span):
     other = whole_run(max_span=span)
     assert digests(whole) == digests(other)
     assert whole.metrics == other.metrics
 
 
-def test_who_waits_for_events_changes_nothing_else(whole: Any) -> None:
+def test_who_waits_for_events_changes_nothing_else(whole):
     without = digests(run(content(objects=SENSORS)))
     with_them = digests(whole)
     for name, digest in without.items():
@@ -153,7 +151,7 @@ def test_who_waits_for_events_changes_nothing_else(whole: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_copy_goes_on_hearing(whole: Any) -> None:
+def test_a_copy_goes_on_hearing(whole):
     simulation = fleet2d.Simulation(content(algorithms=ALL, metrics=METRICS, objects=SENSORS))
     simulation.advance(877)
     twin = copy.deepcopy(simulation)
@@ -161,7 +159,7 @@ def test_a_copy_goes_on_hearing(whole: Any) -> None:
     assert digests(whole) == digests(twin.run()) == digests(simulation.run())
 
 
-def test_a_behavior_reads_the_output_from_the_next_step_on() -> None:
+def test_a_behavior_reads_the_output_from_the_next_step_on():
     stored = run(
         content(
             "20 min",
@@ -177,6 +175,6 @@ def test_a_behavior_reads_the_output_from_the_next_step_on() -> None:
         assert str(before[-1] + 1 if len(before) else 0) == told
 
 
-def test_a_period_beside_events_is_not_minded() -> None:
+def test_a_period_beside_events_is_not_minded():
     odd = {"heard": {**heard("user_seen"), "period": "1.5 s"}}
     assert len(table(run(content("20 min", algorithms=odd)), "heard")["step"])

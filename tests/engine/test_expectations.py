@@ -4,7 +4,6 @@ import copy
 import io
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -139,7 +138,7 @@ def events(entity: str, *kinds: str) -> dict[str, NDArray[Any]]:
     return {name: column[keep] for name, column in rows.items()}
 
 
-def test_distances_are_violated_where_the_trajectories_say_so() -> None:
+def test_distances_are_violated_where_the_trajectories_say_so():
     assert stretches(apart("ana", "astro") <= 1.5) == violations("keeps_off")
     assert stretches(np.hypot(body("ben")["x"] - 1, body("ben")["y"] - 3) < 2) == violations(
         "point"
@@ -149,7 +148,7 @@ def test_distances_are_violated_where_the_trajectories_say_so() -> None:
     assert float(apart("ana", "astro").min()) - 1.5 == pytest.approx(worst)
 
 
-def test_rooms_moves_and_absence_are_those_of_the_trajectories() -> None:
+def test_rooms_moves_and_absence_are_those_of_the_trajectories():
     assert stretches(room("astro") == "bathroom") == violations("room")
     assert stretches(~np.isin(room("ben"), ["living_room", "kitchen"])) == violations("rooms")
     assert stretches(moves("astro") > 0) == violations("still")
@@ -159,14 +158,14 @@ def test_rooms_moves_and_absence_are_those_of_the_trajectories() -> None:
     assert stretches(early) == violations("early")
 
 
-def test_what_holds_for_so_long_is_violated_from_then_on() -> None:
+def test_what_holds_for_so_long_is_violated_from_then_on():
     long = [(a + 20, b) for a, b in stretches(moves("astro") == 0) if b - a >= 20]
 
     assert long
     assert long == violations("long")
 
 
-def test_sights_are_those_of_events_and_observations() -> None:
+def test_sights_are_those_of_events_and_observations():
     rows = events("astro", "user_seen", "user_lost")
     mine = {name: column[rows["user"] == "ben"] for name, column in rows.items()}
     perceived = np.zeros(STEPS, bool)
@@ -184,7 +183,7 @@ def test_sights_are_those_of_events_and_observations() -> None:
     assert 0.5 < perceived.sum() / in_view.sum() < 0.9, "and 70 % are noticed"
 
 
-def test_doors_sensors_and_activities_are_those_of_their_tables() -> None:
+def test_doors_sensors_and_activities_are_those_of_their_tables():
     doors = events("bath", "opened", "shut")
     readings = table(finished(None)[0], "sensors", sensor="contact")
     doing = events("ana", "activity")
@@ -198,14 +197,14 @@ def test_doors_sensors_and_activities_are_those_of_their_tables() -> None:
     )
 
 
-def test_a_count_is_exceeded_from_the_next_event_on() -> None:
+def test_a_count_is_exceeded_from_the_next_event_on():
     steps = events("astro", "user_seen")["step"].tolist()
 
     assert [(steps[1], STEPS - 1)] == violations("few")
     assert 1.0 - len(steps) == finished(None)[1]["few"].robustness
 
 
-def test_a_battery_drains_as_the_robot_moves_and_stands() -> None:
+def test_a_battery_drains_as_the_robot_moves_and_stands():
     at, verdict = body("astro"), finished(None)[1]["charge"]
     poses = np.stack([at["x"], at["y"], at["heading"]], axis=1)
     moved = (poses[1:] != poses[:-1]).any(axis=1)
@@ -217,7 +216,7 @@ def test_a_battery_drains_as_the_robot_moves_and_stands() -> None:
     assert verdict.violations[0].last == STEPS - 1
 
 
-def test_outputs_hold_from_the_step_after_they_were_put_out() -> None:
+def test_outputs_hold_from_the_step_after_they_were_put_out():
     rows = table(finished(None)[0], "share")
     kitchen = [str(name).startswith("kitchen") for name in rows["room"]]
     steps, share = rows["step"][kitchen], rows["share"][kitchen]
@@ -228,14 +227,14 @@ def test_outputs_hold_from_the_step_after_they_were_put_out() -> None:
     assert stretches(~below) == violations("share")
 
 
-def test_metrics_are_judged_by_the_whole_run_at_its_end() -> None:
+def test_metrics_are_judged_by_the_whole_run_at_its_end():
     stored, verdicts = finished(None)
 
     assert stored.metrics["distance"]["ben"] - 1 == verdicts["ends"].robustness
 
 
 @pytest.mark.parametrize("max_span", some([7, 1], 2))
-def test_spans_are_invisible(max_span: int) -> None:
+def test_spans_are_invisible(max_span):
     (whole, verdicts), (cut, again) = finished(None), finished(max_span)
 
     assert digests(whole) == digests(cut)
@@ -245,7 +244,7 @@ def test_spans_are_invisible(max_span: int) -> None:
     }
 
 
-def test_the_table_and_the_manifest_say_what_was_violated() -> None:
+def test_the_table_and_the_manifest_say_what_was_violated():
     stored, verdicts = finished(None)
     rows = table(stored, "violations", expectation="keeps_off")
 
@@ -258,7 +257,7 @@ def test_the_table_and_the_manifest_say_what_was_violated() -> None:
     assert "keeps_off is violated: always(distance" in content["says"]
 
 
-def test_a_run_that_expects_nothing_stores_nothing_of_it() -> None:
+def test_a_run_that_expects_nothing_stores_nothing_of_it():
     expecting, plain = finished(None)[0], run(home(expect={}))
 
     assert "violations" not in plain.tables
@@ -269,7 +268,7 @@ def test_a_run_that_expects_nothing_stores_nothing_of_it() -> None:
     assert others == {name: d for name, d in digests(plain).items() if name != "run"}
 
 
-def test_a_run_is_reproduced_with_what_python_expected_of_it(tmp_path: Path) -> None:
+def test_a_run_is_reproduced_with_what_python_expected_of_it(tmp_path):
     simulation = fleet2d.Simulation(home(), out=tmp_path / "run")
     simulation.advance(100)
     simulation.expect(always(distance("ana", "astro") > 2), "farther")
@@ -280,9 +279,7 @@ def test_a_run_is_reproduced_with_what_python_expected_of_it(tmp_path: Path) -> 
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
-def test_a_stored_run_may_have_an_expectation_that_was_never_put_to_the_test(
-    tmp_path: Path,
-) -> None:
+def test_a_stored_run_may_have_an_expectation_that_was_never_put_to_the_test(tmp_path):
     """Its manifest was called damaged, because `holds` was null."""
     waits = "after(speed(astro) > 50, moving(astro), within=1 min)"
     stored = fleet2d.Simulation(home(expect={"waits": waits}), out=tmp_path / "run").run()
@@ -292,7 +289,7 @@ def test_a_stored_run_may_have_an_expectation_that_was_never_put_to_the_test(
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
-def test_what_is_expected_goes_on_in_copies_and_files() -> None:
+def test_what_is_expected_goes_on_in_copies_and_files():
     simulation = fleet2d.Simulation(home())
     simulation.advance(100)
     simulation.expect(eventually(seen("ben", by="astro")), "sees")
@@ -306,7 +303,7 @@ def test_what_is_expected_goes_on_in_copies_and_files() -> None:
     assert expected == loaded.run().manifest["expectations"]
 
 
-def test_an_expectation_in_mid_run_begins_with_what_is_so_then() -> None:
+def test_an_expectation_in_mid_run_begins_with_what_is_so_then():
     later = fleet2d.Simulation(home(expect={}))
     later.advance(200)
     for name, text in EXPECTED.items():
@@ -319,7 +316,7 @@ def test_an_expectation_in_mid_run_begins_with_what_is_so_then() -> None:
         assert clipped == [(v.first, v.last) for v in verdict.violations], name
 
 
-def test_a_simulation_says_when_it_is_decided() -> None:
+def test_a_simulation_says_when_it_is_decided():
     simulation = fleet2d.Simulation(home(expect={"still": "never(moving(ben))"}))
     simulation.advance(60)
 
@@ -337,7 +334,7 @@ def simulation_after(simulation: fleet2d.Simulation) -> fleet2d.Simulation:
     return simulation
 
 
-def test_a_finished_run_is_judged_by_running_it_again() -> None:
+def test_a_finished_run_is_judged_by_running_it_again():
     stored, verdicts = finished(None)
     verdict = fleet2d.judge(always(distance("ana", "astro") > 1.5), stored, "keeps_off")
 
@@ -373,9 +370,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG.items())
-def test_wrong_expectations_are_refused_with_their_line(
-    text: str, message: str, tmp_path: Path
-) -> None:
+def test_wrong_expectations_are_refused_with_their_line(text, message, tmp_path):
     import yaml
 
     path = tmp_path / "home.yaml"
@@ -400,15 +395,15 @@ def test_wrong_expectations_are_refused_with_their_line(
         (True, "expected an expectation like always"),
     ],
 )
-def test_what_is_no_text_is_refused_with_an_example(wrong: Any, example: str) -> None:
+def test_what_is_no_text_is_refused_with_an_example(wrong, example):
     with pytest.raises(ScenarioError, match=rf"expect\.wrong: {example}"):
         fleet2d.Simulation(home(expect={"wrong": wrong}))
 
 
 @pytest.mark.parametrize("takes_the_guest_for_her", [True, False])
 def test_who_is_found_is_told_apart_from_whom_the_robot_believes_to_have_found(
-    takes_the_guest_for_her: bool,
-) -> None:
+    takes_the_guest_for_her,
+):
     taken = {"taken_for": {"users": {"gina": {"rate": 1, "others": {"ana": 1}}}}}
     still = {
         name: {

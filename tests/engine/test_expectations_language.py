@@ -63,7 +63,7 @@ def rooms(run: fleet2d.Run, name: str) -> Any:
     return poses(run, name)["room"].astype(str)
 
 
-def test_two_signals_are_compared() -> None:
+def test_two_signals_are_compared():
     run, verdict = verdicts(
         nearer="always(distance(astro, ana) < distance(astro, ben))",
         together="never(room(astro) == room(ben))",
@@ -76,7 +76,7 @@ def test_two_signals_are_compared() -> None:
     assert 0 < same.sum() < 720
 
 
-def test_signals_are_computed_with() -> None:
+def test_signals_are_computed_with():
     run, verdict = verdicts(
         far="always(distance(astro, ana) + 50 cm < 2 * distance(astro, ben))",
         half="always((distance(astro, ana) - distance(astro, ben)) / 2 < 1 m)",
@@ -89,7 +89,7 @@ def test_signals_are_computed_with() -> None:
     assert (wrong(verdict["ratio"]) == (ana / ben >= 3)).all()
 
 
-def test_anyone_and_everyone_are_the_people_of_the_scenario() -> None:
+def test_anyone_and_everyone_are_the_people_of_the_scenario():
     run, verdict = verdicts(
         off="never(distance(astro, anyone) < 1 m)",
         all="always(distance(astro, everyone) >= 1 m)",
@@ -106,7 +106,7 @@ def test_anyone_and_everyone_are_the_people_of_the_scenario() -> None:
     assert verdict["off"].robustness == pytest.approx(np.minimum(ana, ben).min() - 1)
 
 
-def test_nearest_is_the_robot_that_is_nearest_at_each_step() -> None:
+def test_nearest_is_the_robot_that_is_nearest_at_each_step():
     run, verdict = verdicts(
         who="always(nearest(ana) == astro)",
         off="always(distance(nearest(ana), ana) > 1 m)",
@@ -117,7 +117,7 @@ def test_nearest_is_the_robot_that_is_nearest_at_each_step() -> None:
     assert (wrong(verdict["off"]) == (np.minimum(astro, bolt) <= 1)).all()
 
 
-def test_a_kind_of_rooms_that_the_home_lacks_is_a_note_not_an_error() -> None:
+def test_a_kind_of_rooms_that_the_home_lacks_is_a_note_not_an_error():
     _, verdict = verdicts(
         out="never(room(astro) == office)",
         near="never(distance(astro, any toilet) < 1 m)",
@@ -133,7 +133,7 @@ def test_a_kind_of_rooms_that_the_home_lacks_is_a_note_not_an_error() -> None:
     assert verdict["bath"].notes == ()
 
 
-def test_run_and_validate_note_a_kind_of_rooms_that_an_expectation_lacks() -> None:
+def test_run_and_validate_note_a_kind_of_rooms_that_an_expectation_lacks():
     simulation = fleet2d.Simulation(home(expect={"out": "never(room(astro) == office)"}))
     note = 'expect.out: room("astro"): this home has no office'
 
@@ -141,7 +141,7 @@ def test_run_and_validate_note_a_kind_of_rooms_that_an_expectation_lacks() -> No
     assert note in simulation.run().manifest["notes"]
 
 
-def test_likeliest_is_the_room_with_the_highest_probability() -> None:
+def test_likeliest_is_the_room_with_the_highest_probability():
     run, verdict = verdicts(
         where="never(likeliest(share) == bathroom)", same="never(likeliest(share) == room(ana))"
     )
@@ -157,7 +157,7 @@ def test_likeliest_is_the_room_with_the_highest_probability() -> None:
         verdicts(where="never(likeliest(share, ana) == bathroom)")
 
 
-def test_a_share_is_of_the_time_so_far_and_counts_at_the_end() -> None:
+def test_a_share_is_of_the_time_so_far_and_counts_at_the_end():
     run, verdict = verdicts(
         near="share(distance(astro, ana) < 3 m) >= 80 %",
         then="share(seen(ana, by=astro), of=room(ana) == room(astro)) >= 1 %",
@@ -170,7 +170,7 @@ def test_a_share_is_of_the_time_so_far_and_counts_at_the_end() -> None:
     assert verdict["hour"].unit == verdict["near"].unit == "share"
 
 
-def test_implies_is_untested_if_its_premise_never_came() -> None:
+def test_implies_is_untested_if_its_premise_never_came():
     _, verdict = verdicts(
         never="always(implies(distance(astro, ana) < 0.001 m, moving(astro)))",
         often="always(implies(room(astro) == kitchen, distance(astro, kitchen) < 1 mm))",
@@ -181,7 +181,7 @@ def test_implies_is_untested_if_its_premise_never_came() -> None:
     assert verdict["often"].holds
 
 
-def test_a_window_has_two_ends() -> None:
+def test_a_window_has_two_ends():
     begin = "events(find_begins, astro)"
     texts = [
         f"after({begin}, moving(astro), within=1..2 min)",
@@ -198,7 +198,7 @@ def test_a_window_has_two_ends() -> None:
         parse_expectation("eventually(moving(astro), within=2..1 min)")
 
 
-def test_the_past_is_told_by_once_and_since() -> None:
+def test_the_past_is_told_by_once_and_since():
     run, verdict = verdicts(
         once="always(once(moving(astro), within=10 s))",
         since="never(since(not moving(astro), room(astro) == kitchen))",
@@ -215,7 +215,7 @@ def test_the_past_is_told_by_once_and_since() -> None:
     assert (wrong(verdict["since"]) == np.array(still_since)).all()
 
 
-def test_holds_for_120_s_is_120_s() -> None:
+def test_holds_for_120_s_is_120_s():
     run, verdict = verdicts(long="never(holds_for(not moving(astro), 20 s))")
     at = poses(run, "astro")
     still = np.append(True, np.hypot(np.diff(at["x"]), np.diff(at["y"])) == 0)
@@ -242,20 +242,20 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("text", "message"), REFUSED.items())
-def test_words_that_can_never_occur_are_refused(text: str, message: str) -> None:
+def test_words_that_can_never_occur_are_refused(text, message):
     with pytest.raises((ScenarioError, InputError)) as caught:
         fleet2d.Simulation(home(expect={"wrong": text}))
     assert message in str(caught.value)
 
 
-def test_a_script_may_not_wait_for_somebody_unknown() -> None:
+def test_a_script_may_not_wait_for_somebody_unknown():
     with pytest.raises(ScenarioError, match="'found' with the detail 'bob'"):
         fleet2d.Simulation(home(script=[{"on": ["found", "astro", "bob"], "replan": "astro"}]))
     with pytest.raises(ScenarioError, match="did you mean 'sleep'"):
         fleet2d.Simulation(home(script=[{"on": ["activity", "ana", "slep"], "replan": "astro"}]))
 
 
-def test_an_activity_that_a_script_starts_is_known() -> None:
+def test_an_activity_that_a_script_starts_is_known():
     told = {"at": "07:05", "activity": "ana", "what": "chess", "to": "kitchen"}
     waits = {"on": ["activity", "ana", "chess"], "replan": "astro"}
     simulation = fleet2d.Simulation(
@@ -266,7 +266,7 @@ def test_an_activity_that_a_script_starts_is_known() -> None:
     assert simulation.verdicts()["plays"].holds
 
 
-def test_nobody_is_refused_where_there_is_no_user() -> None:
+def test_nobody_is_refused_where_there_is_no_user():
     with pytest.raises(ScenarioError, match="there is no anyone: the scenario has no other user"):
         fleet2d.Simulation(
             home(
@@ -288,11 +288,11 @@ TEXTS = [
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_texts_are_read_as_they_are_written(text: str) -> None:
+def test_texts_are_read_as_they_are_written(text):
     assert str(parse_expectation(text)) == text
 
 
-def test_python_has_the_same_language() -> None:
+def test_python_has_the_same_language():
     near = distance("ana", "astro") + 0.5 < distance("ana", "ben")
     assert str(near) == '(distance("ana", "astro") + 0.5 m) < distance("ana", "ben")'
     assert str(2 * speed("ana") >= "1 m/s") == '(2 * speed("ana")) >= 1 m/s'
@@ -326,7 +326,7 @@ def test_python_has_the_same_language() -> None:
         ),
     ],
 )
-def test_a_comparison_whose_outcome_is_certain_is_noted(text: str, outcome: str) -> None:
+def test_a_comparison_whose_outcome_is_certain_is_noted(text, outcome):
     simulation = fleet2d.Simulation(home(expect={"it": text}, metrics={"sightings": {}}))
     told = [note for note in simulation.notes if note.startswith("expect")]
 
@@ -334,7 +334,7 @@ def test_a_comparison_whose_outcome_is_certain_is_noted(text: str, outcome: str)
     assert told[0].endswith(outcome)
 
 
-def test_comparisons_whose_outcome_is_open_are_not_noted() -> None:
+def test_comparisons_whose_outcome_is_open_are_not_noted():
     texts = [
         "at_end(metric(sightings.ana) >= 0)",  # it is known
         "at_end(metric(distance.astro) > 50)",
@@ -350,9 +350,7 @@ def test_comparisons_whose_outcome_is_open_are_not_noted() -> None:
 
 @pytest.mark.parametrize("step", ["100 ms", "1 s"])
 @pytest.mark.parametrize("slows", [[], [{"area": WHOLE_HOME, "speed": "50 %"}]])
-def test_a_robot_is_no_faster_than_its_speed_by_the_rounding_of_positions(
-    step: str, slows: list[dict[str, Any]]
-) -> None:
+def test_a_robot_is_no_faster_than_its_speed_by_the_rounding_of_positions(step, slows):
     limit = 0.3 if slows else 0.6
     document = scenario(
         "3 min",

@@ -1,12 +1,11 @@
 """What fails in the middle of a run: whose fault it is, when, and that the run so far is readable."""
 
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.scenes import Cli, digests, run, scenario, table
+from tests.scenes import digests, run, scenario, table
 
 import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
@@ -183,8 +182,8 @@ CASES = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("changes", "path", "words"), CASES)
 def test_an_error_names_who_failed_and_when_and_the_run_so_far_is_whole(
-    changes: dict[str, Any], path: str, words: list[str], tmp_path: Path
-) -> None:
+    changes, path, words, tmp_path
+):
     with pytest.raises(ComponentError) as caught:
         run(content(**changes), out=tmp_path / "run")
     for word in (path, f"step {AT}", *words):
@@ -207,7 +206,7 @@ def test_an_error_names_who_failed_and_when_and_the_run_so_far_is_whole(
 
 
 @pytest.mark.parametrize("when", ["result", "not a number"])
-def test_a_metric_that_fails_at_the_end_leaves_the_run_readable(when: str, tmp_path: Path) -> None:
+def test_a_metric_that_fails_at_the_end_leaves_the_run_readable(when, tmp_path):
     broken = {"mine": {"type": f"{MINE}FailsMetric", "when": when}}
     with pytest.raises(ComponentError, match=r"metrics\.mine failed at step 18000"):
         run(content(metrics=broken), out=tmp_path / "run")
@@ -217,7 +216,7 @@ def test_a_metric_that_fails_at_the_end_leaves_the_run_readable(when: str, tmp_p
     assert digests(run(content()))["key_frames"] == digests(stored)["key_frames"]
 
 
-def test_undeclared_needs_are_refused_whoever_else_has_them() -> None:
+def test_undeclared_needs_are_refused_whoever_else_has_them():
     """Another one that declares them makes no difference."""
     with pytest.raises(ComponentError, match=r"needs = \{'evidence'\}"):
         run(content(algorithms={"mine": {"type": f"{MINE}Fails", "how": "evidence"}}))
@@ -234,7 +233,7 @@ class Greedy(Algorithm):
         return {"cells": history.between(first, history.end).exposure.sum(dtype=float)}
 
 
-def test_exposure_between_other_steps_than_updates_is_refused_not_wrong() -> None:
+def test_exposure_between_other_steps_than_updates_is_refused_not_wrong():
     with pytest.raises(ComponentError, match="from update to update, and none is at step 1234"):
         run(content(algorithms={"mine": {"type": f"{MINE}Greedy"}}))
 
@@ -252,9 +251,7 @@ class Broken(fleet2d.Algorithm):
 
 
 @pytest.mark.slow
-def test_the_command_line_shows_the_users_own_lines_and_where_the_run_is(
-    fleet2d: Cli, tmp_path: Path
-) -> None:
+def test_the_command_line_shows_the_users_own_lines_and_where_the_run_is(fleet2d, tmp_path):
     (tmp_path / "mine.py").write_text(USERS_OWN)
     override = "algorithms.broken.type=mine:Broken"
     code, _, err = fleet2d(

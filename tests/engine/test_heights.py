@@ -1,6 +1,5 @@
 """Heights of cameras, bodies and furniture: in runs, for every span and by every exact method."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,7 +35,7 @@ def behind(
 SOFA = {"type": "sofa", "size": [1.2, 0.9]}
 
 
-def test_who_stands_behind_a_sofa_is_seen_and_who_lies_there_is_not() -> None:
+def test_who_stands_behind_a_sofa_is_seen_and_who_lies_there_is_not():
     content = behind(SOFA)
 
     assert {"ana": ALL} == seen(content)
@@ -51,23 +50,17 @@ HIDDEN_BELOW_M = 0.4 + (0.85 - 0.4) * 3.4 / 1.55
 
 
 @pytest.mark.parametrize(("above_m", "expected"), [(0.005, {"ana": ALL}), (-0.005, {})])
-def test_a_head_is_seen_from_the_height_on_at_which_the_line_clears_the_sofa(
-    above_m: float, expected: dict[str, list[int]]
-) -> None:
+def test_a_head_is_seen_from_the_height_on_at_which_the_line_clears_the_sofa(above_m, expected):
     assert expected == seen(behind(SOFA, height=(HIDDEN_BELOW_M + above_m) * 16 / 15))
 
 
 @pytest.mark.parametrize(("camera_m", "expected"), [(2.5, {"ana": ALL}), (1.0, {})])
-def test_a_high_camera_looks_over_furniture_that_hides_from_a_low_one(
-    camera_m: float, expected: dict[str, list[int]]
-) -> None:
+def test_a_high_camera_looks_over_furniture_that_hides_from_a_low_one(camera_m, expected):
     assert expected == seen(behind(SOFA, camera_m, x=4.7, height=0.3))
 
 
 @pytest.mark.parametrize(("height_cm", "expected"), [(80, {}), (15, {"ana": ALL})])
-def test_a_sofa_of_sweet_home_3d_hides_as_high_as_its_file_says(
-    tmp_path: Path, height_cm: int, expected: dict[str, list[int]]
-) -> None:
+def test_a_sofa_of_sweet_home_3d_hides_as_high_as_its_file_says(tmp_path, height_cm, expected):
     """Ana lies behind it; its back is to the right."""
     home = tmp_path / "Home.xml"
     home.write_text(
@@ -90,13 +83,11 @@ def test_a_sofa_of_sweet_home_3d_hides_as_high_as_its_file_says(
     ],
     ids=["on legs", "flat", "high", "up to the ceiling"],
 )
-def test_furniture_hides_as_high_as_it_is(
-    piece: dict[str, Any], expected: dict[str, list[int]]
-) -> None:
+def test_furniture_hides_as_high_as_it_is(piece, expected):
     assert expected == seen(behind(piece))
 
 
-def test_the_share_in_view_counts_parts_of_the_body_behind_furniture() -> None:
+def test_the_share_in_view_counts_parts_of_the_body_behind_furniture():
     content = behind(SOFA)
     robot = content["robots"]["astro"]
     robot["camera"]["body_points"] = 6
@@ -107,7 +98,7 @@ def test_the_share_in_view_counts_parts_of_the_body_behind_furniture() -> None:
 
 
 @pytest.mark.parametrize(("height_m", "expected"), [(1.1, [*ALL]), (1.9, [])])
-def test_a_child_does_not_hide_an_adult(height_m: float, expected: list[int]) -> None:
+def test_a_child_does_not_hide_an_adult(height_m, expected):
     content = behind(None, 1.6)
     content["users"]["ben"] = {"start": [2.5, 3.2], "height": height_m}
     content["sight"]["people_occlude"] = True
@@ -115,14 +106,14 @@ def test_a_child_does_not_hide_an_adult(height_m: float, expected: list[int]) ->
     assert expected == seen(content).get("ana", [])
 
 
-def test_moved_furniture_no_longer_hides() -> None:
+def test_moved_furniture_no_longer_hides():
     move = {"at": "5 s", "move": "sofa_1", "to": [2.6, 1.0]}
     content = {**behind({**SOFA, "height": 2.0, "size": [0.6, 0.9]}), "script": [move]}
 
     assert [5, 6, 7, 8, 9] == seen(content)["ana"]
 
 
-def test_a_pet_is_low_and_a_height_of_its_own_counts() -> None:
+def test_a_pet_is_low_and_a_height_of_its_own_counts():
     pet = {"type": "pet", "nap": "1 h", "start": [4.0, 3.2]}
 
     for of_body, is_seen in (({}, False), ({"height": 1.7}, True)):
@@ -153,13 +144,13 @@ def walkers() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("span", some([37, 1], 2))
-def test_spans_do_not_show_where_heights_matter(span: int) -> None:
+def test_spans_do_not_show_where_heights_matter(span):
     content = walkers()
 
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
-def test_heights_are_the_same_by_every_exact_method_and_change_what_is_seen() -> None:
+def test_heights_are_the_same_by_every_exact_method_and_change_what_is_seen():
     content = walkers()
     expected = digests(run(content))
     by_polygon = {**content["sight"], "method": {"type": "visibility_polygon"}}
@@ -170,7 +161,7 @@ def test_heights_are_the_same_by_every_exact_method_and_change_what_is_seen() ->
     assert expected["observations"] != digests(run({**content, "sight": {}}))["observations"]
 
 
-def test_the_back_of_a_sofa_is_high_and_its_seat_low() -> None:
+def test_the_back_of_a_sofa_is_high_and_its_seat_low():
     plan = fleet2d.load_floorplan()
     home = Home(plan)
     units = plan.lattice.units_per_m
@@ -188,7 +179,7 @@ def test_the_back_of_a_sofa_is_high_and_its_seat_low() -> None:
         assert abs((middle - origin) @ ahead + 0.325) < 0.02
 
 
-def test_a_height_of_what_blocks_sight_is_refused() -> None:
+def test_a_height_of_what_blocks_sight_is_refused():
     wardrobe = {"type": "wardrobe", "height": 0.9, "size": [1.2, 0.6]}
 
     with pytest.raises(fleet2d.InputError, match="blocks: path"):
@@ -196,7 +187,7 @@ def test_a_height_of_what_blocks_sight_is_refused() -> None:
     assert {"ana": ALL} == seen(behind({**wardrobe, "blocks": "path"}))
 
 
-def test_a_height_without_effect_is_a_note() -> None:
+def test_a_height_without_effect_is_a_note():
     content = behind(SOFA)
     notes = fleet2d.Simulation({**content, "sight": {}}).notes
 

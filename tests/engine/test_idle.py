@@ -33,9 +33,7 @@ def notes(document: dict[str, Any]) -> list[str]:
         ([{"type": "dock", "rest": True}, PATROL], "patrol never gets"),
     ],
 )
-def test_a_behavior_after_one_that_always_has_a_plan_is_noted(
-    behaviors: list[dict[str, Any]], later: str
-) -> None:
+def test_a_behavior_after_one_that_always_has_a_plan_is_noted(behaviors, later):
     first = behaviors[0]["type"]
 
     assert notes(home(*behaviors)) == [
@@ -52,11 +50,11 @@ def test_a_behavior_after_one_that_always_has_a_plan_is_noted(
         [PATROL | {"when": "07:00-07:05"}, {"type": "dock"}],
     ],
 )
-def test_behaviors_that_all_get_a_turn_are_not_noted(behaviors: list[dict[str, Any]]) -> None:
+def test_behaviors_that_all_get_a_turn_are_not_noted(behaviors):
     assert notes(home(*behaviors)) == []
 
 
-def test_reactions_of_a_person_after_her_days_are_noted() -> None:
+def test_reactions_of_a_person_after_her_days_are_noted():
     days = {"type": "schedule", "days": AGENDA}
     users = {"ana": {"behaviors": [days, {"type": "reactions"}]}}
     simulation = fleet2d.Simulation(home(PATROL) | {"users": users})
@@ -67,13 +65,13 @@ def test_reactions_of_a_person_after_her_days_are_noted() -> None:
     ]
 
 
-def test_a_behavior_whose_turn_comes_as_the_script_switches_one_off_is_not_noted() -> None:
+def test_a_behavior_whose_turn_comes_as_the_script_switches_one_off_is_not_noted():
     script = [{"at": "07:02", "switch_off": "astro", "behavior": "patrol"}]
 
     assert notes(home(PATROL, {"type": "dock"}, script=script)) == []
 
 
-def test_interactions_that_no_behavior_asks_for_are_noted() -> None:
+def test_interactions_that_no_behavior_asks_for_are_noted():
     tea = {"tea": {"to": "ana", "do": "offer", "at": ["07:05"]}}
 
     assert notes(home(PATROL, interactions=tea)) == [
@@ -83,7 +81,7 @@ def test_interactions_that_no_behavior_asks_for_are_noted() -> None:
     assert notes(home({"type": "opportunistic"}, PATROL, interactions=tea)) == []
 
 
-def test_an_entry_of_the_script_whose_event_never_comes_is_noted_at_the_end() -> None:
+def test_an_entry_of_the_script_whose_event_never_comes_is_noted_at_the_end():
     script = [
         {"on": ["activity", "ana", "wash"], "replan": "astro"},
         {"on": ["came_home", "ana"], "replan": "astro"},
@@ -104,14 +102,14 @@ def family(*members: str, **users: Any) -> list[str]:
     return [note for note in simulation.notes if "household" in note]
 
 
-def test_a_member_of_a_household_who_is_no_user_is_noted() -> None:
+def test_a_member_of_a_household_who_is_no_user_is_noted():
     assert family("ana", "ben") == [
         "users.ana.household: ben is a member and no user: add users.ben, or leave ben out"
     ]
     assert family("ana") == []
 
 
-def test_members_with_different_settings_of_their_household_are_noted() -> None:
+def test_members_with_different_settings_of_their_household_are_noted():
     other = {"members": {"ana": "works_outside", "ben": "works_outside"}, "welcome": 0.1}
     found = family("ana", "ben", ben={"type": "routine", "household": other})
     advice = "give users.ben the same household, with the same settings"

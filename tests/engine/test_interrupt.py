@@ -5,7 +5,6 @@ import io
 import textwrap
 from collections.abc import Callable
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,13 +80,13 @@ def twin(steps: int) -> list[int]:
 
 
 @pytest.mark.parametrize("max_span", [None, 1, 5, 64])
-def test_plan_ends_when_the_condition_becomes_true(max_span: int | None) -> None:
+def test_plan_ends_when_the_condition_becomes_true(max_span):
     stored = run(content(EveryWeek.type_name), f"simulation.max_span={max_span or 'null'}")
 
     assert twin(180) == reactions(stored)
 
 
-def test_a_behavior_before_the_active_one_listens() -> None:
+def test_a_behavior_before_the_active_one_listens():
     first = {"type": Overrules.type_name}
     rests = {"type": Waits.type_name, "event": "user_seen"}
     stored = run(scenario("3 min", robots={"astro": {"behaviors": [first, rests]}}))
@@ -95,7 +94,7 @@ def test_a_behavior_before_the_active_one_listens() -> None:
     assert twin(180) == reactions(stored)
 
 
-def test_copies_and_saved_simulations_go_on_alike() -> None:
+def test_copies_and_saved_simulations_go_on_alike():
     simulation = Simulation(content(EveryWeek.type_name), seed=1)
     simulation.advance(50)
     other = copy.deepcopy(simulation)
@@ -114,7 +113,7 @@ class EveryTwelve(Interrupt):
 
 
 @pytest.mark.parametrize("max_span", ["null", "1", "10"])
-def test_bodies_and_interrupts_do_not_disturb_each_other(max_span: str) -> None:
+def test_bodies_and_interrupts_do_not_disturb_each_other(max_span):
     names = {"astro": EveryWeek, "bolt": EveryTwelve, "zoe": EveryWeek}
     robots = {
         name: {"type": Waits.type_name, "event": event.type_name} for name, event in names.items()
@@ -127,13 +126,13 @@ def test_bodies_and_interrupts_do_not_disturb_each_other(max_span: str) -> None:
         assert expected == rows["step"].tolist()
 
 
-def test_nothing_is_done_where_no_plan_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_done_where_no_plan_waits(monkeypatch):
     monkeypatch.setattr(Interruptions, "limit", lambda *_: pytest.fail("it looked ahead"))
 
     run(content("user_seen"))
 
 
-def test_answer_of_a_wrong_shape_names_the_interrupt_and_what_is_expected() -> None:
+def test_answer_of_a_wrong_shape_names_the_interrupt_and_what_is_expected():
     with pytest.raises(ComponentError, match=r"robots\.astro.*Counts.*returned 3.*booleans"):
         run(content(Counts.type_name))
 
@@ -144,7 +143,7 @@ def raises(error: type[Exception], call: Callable[[], object]) -> str:
     return str(caught.value)
 
 
-def test_event_that_there_is_not_is_refused_with_the_nearest() -> None:
+def test_event_that_there_is_not_is_refused_with_the_nearest():
     text = raises(ComponentError, lambda: run(content("home_emty")))
 
     assert "robots.astro: no event 'home_emty' interrupts its plans" in text
@@ -153,9 +152,7 @@ def test_event_that_there_is_not_is_refused_with_the_nearest() -> None:
     assert "user_lost, user_seen" in text
 
 
-def test_behavior_that_listens_to_an_unknown_event_is_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_behavior_that_listens_to_an_unknown_event_is_refused(monkeypatch):
     monkeypatch.setattr(Overrules, "listens", frozenset({"doorbell"}))
     first = {"type": Overrules.type_name}
     text = raises(
@@ -183,7 +180,7 @@ class Rests(Behavior):
 """
 
 
-def test_interrupt_of_a_users_own_file_is_given_by_its_class(tmp_path: Path) -> None:
+def test_interrupt_of_a_users_own_file_is_given_by_its_class(tmp_path):
     (tmp_path / "rest.py").write_text(textwrap.dedent(OWN))
     behavior = {"type": f"{tmp_path.as_posix()}/rest:Rests"}
     simulation = Simulation(scenario("3 min", robots={"astro": {"behaviors": [behavior]}}), seed=1)
@@ -204,9 +201,7 @@ OUT = [
 
 
 @pytest.mark.parametrize(("event", "kind"), [("home_empty", "left_home"), ("home_occupied", "came_home")])  # fmt: skip
-def test_robot_decides_once_after_the_last_person_left_or_the_first_came(
-    event: str, kind: str
-) -> None:
+def test_robot_decides_once_after_the_last_person_left_or_the_first_came(event, kind):
     waits = {
         "type": "tests.engine.test_interrupt:Waits",
         "event": event,

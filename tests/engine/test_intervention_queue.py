@@ -2,7 +2,6 @@
 
 import copy
 from datetime import datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -50,7 +49,7 @@ def steer(run: fleet2d.Simulation) -> None:
 
 
 @pytest.mark.parametrize("max_span", [None, 1, 7])
-def test_a_steered_run_is_done_again_from_its_manifest(max_span: int | None) -> None:
+def test_a_steered_run_is_done_again_from_its_manifest(max_span):
     steered = simulation()
     steer(steered)
     stored = steered.run()
@@ -63,14 +62,14 @@ def test_a_steered_run_is_done_again_from_its_manifest(max_span: int | None) -> 
     assert ["put", "replan", "drive", "decide", "decide"] == [i["do"] for i in interventions]
 
 
-def test_reproduce_does_interventions_again(tmp_path: Path) -> None:
+def test_reproduce_does_interventions_again(tmp_path):
     steered = fleet2d.Simulation(home(), out=tmp_path / "run")
     steer(steered)
     steered.run()
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
-def test_a_body_that_is_put_somewhere_is_there_at_once_and_nobody_else_changes() -> None:
+def test_a_body_that_is_put_somewhere_is_there_at_once_and_nobody_else_changes():
     run, other = simulation(), simulation()
     for each in (run, other):
         each.advance(120)
@@ -81,7 +80,7 @@ def test_a_body_that_is_put_somewhere_is_there_at_once_and_nobody_else_changes()
     assert run.state["ana"] == other.state["ana"]
 
 
-def test_a_body_is_put_at_a_point_with_a_heading() -> None:
+def test_a_body_is_put_at_a_point_with_a_heading():
     run = simulation()
     run.advance(10)
     x, y = run.home.rooms[0].anchor_xy
@@ -91,7 +90,7 @@ def test_a_body_is_put_at_a_point_with_a_heading() -> None:
     assert (x, y) == pytest.approx((state["x"], state["y"]), abs=1.5)  # a step away
 
 
-def test_poses_are_rebuilt_through_a_jump() -> None:
+def test_poses_are_rebuilt_through_a_jump():
     content = home(artifacts={"trajectories": "every step"})
     run = fleet2d.Simulation(content)
     run.advance(200)
@@ -108,7 +107,7 @@ def test_poses_are_rebuilt_through_a_jump() -> None:
     ("place", "error"),
     [("attic", PlacementError), ((-5.0, -5.0), PlacementError)],
 )
-def test_a_place_that_can_not_be_is_refused_and_nothing_is_done(place: Any, error: type) -> None:
+def test_a_place_that_can_not_be_is_refused_and_nothing_is_done(place, error):
     run = simulation()
     run.advance(5)
     with pytest.raises(error):
@@ -116,7 +115,7 @@ def test_a_place_that_can_not_be_is_refused_and_nothing_is_done(place: Any, erro
     assert [] == run.run().manifest["interventions"]
 
 
-def test_names_that_do_not_exist_are_refused_with_the_nearest() -> None:
+def test_names_that_do_not_exist_are_refused_with_the_nearest():
     run = simulation()
     for call in (lambda: run.do(Put("anna", "kitchen")), lambda: run.do(Replan("anna"))):
         with pytest.raises(ScenarioError, match="did you mean 'ana'"):
@@ -129,7 +128,7 @@ def test_names_that_do_not_exist_are_refused_with_the_nearest() -> None:
         run.run_until("noon")
 
 
-def test_a_driven_body_without_a_plan_is_an_error_and_others_need_none() -> None:
+def test_a_driven_body_without_a_plan_is_an_error_and_others_need_none():
     run = simulation()
     run.drive("astro")
     assert ["astro"] == run.pending()
@@ -139,7 +138,7 @@ def test_a_driven_body_without_a_plan_is_an_error_and_others_need_none() -> None
         run.advance({"astro": run.plan("astro").stay(), "ana": run.plan("ana").stay()})
 
 
-def test_an_outside_mind_takes_every_decision_and_no_other_step() -> None:
+def test_an_outside_mind_takes_every_decision_and_no_other_step():
     run = simulation()
     run.drive("astro")
     steps = []
@@ -150,7 +149,7 @@ def test_an_outside_mind_takes_every_decision_and_no_other_step() -> None:
     assert run.done
 
 
-def test_run_until_a_time_of_day_is_the_next_such_time() -> None:
+def test_run_until_a_time_of_day_is_the_next_such_time():
     run = fleet2d.Simulation(home("3 d"))
     run.run_until("19:00")
     assert ("2026-01-05T19:00:00", 12 * 3600) == (run.time.isoformat(), run.step)
@@ -159,7 +158,7 @@ def test_run_until_a_time_of_day_is_the_next_such_time() -> None:
 
 
 @pytest.mark.parametrize("max_span", [None, 1, 50])
-def test_run_until_an_event_stops_right_after_the_first_one(max_span: int | None) -> None:
+def test_run_until_an_event_stops_right_after_the_first_one(max_span):
     content = everything("30 min")
     content["simulation"]["max_span"] = max_span
     run = fleet2d.Simulation(content)
@@ -171,14 +170,14 @@ def test_run_until_an_event_stops_right_after_the_first_one(max_span: int | None
     assert (first["step"], first["entity"]) == (result.step, result.entity)
 
 
-def test_waiting_for_an_event_changes_nothing_and_ends_at_its_timeout() -> None:
+def test_waiting_for_an_event_changes_nothing_and_ends_at_its_timeout():
     run = simulation()
     assert run.run_until(event="docks", timeout="5 min") is None
     assert 300 == run.step
     assert run.run().digest == fleet2d.run(home()).digest
 
 
-def test_events_are_those_of_the_table_however_a_run_is_cut() -> None:
+def test_events_are_those_of_the_table_however_a_run_is_cut():
     content = everything("30 min")
     table = fleet2d.run(content).pandas("events")
     run = fleet2d.Simulation(content)
@@ -195,7 +194,7 @@ def test_events_are_those_of_the_table_however_a_run_is_cut() -> None:
     assert [e for e in events if e.step >= 900] == run.events(since=900)
 
 
-def test_a_change_by_a_script_is_done_again() -> None:
+def test_a_change_by_a_script_is_done_again():
     door = {"type": "door", "doorway": "bathroom_1"}
     content = home("30 min", objects={"kitchen_door": door})
     run = fleet2d.Simulation(content)
@@ -209,7 +208,7 @@ def test_a_change_by_a_script_is_done_again() -> None:
     assert 1 == len(interventions)
 
 
-def test_a_branch_keeps_what_was_done_and_what_is_to_be_done() -> None:
+def test_a_branch_keeps_what_was_done_and_what_is_to_be_done():
     run = simulation()
     run.advance(50)
     run.do(Put("ana", "kitchen"))
@@ -219,14 +218,14 @@ def test_a_branch_keeps_what_was_done_and_what_is_to_be_done() -> None:
     assert first.manifest["interventions"] == second.manifest["interventions"]
 
 
-def test_interventions_are_read_as_they_are_written() -> None:
+def test_interventions_are_read_as_they_are_written():
     content = {"do": "put", "step": 3, "entity": "ana", "to": [1.5, 2.0], "heading_deg": 5.0}
     step, fields = read_record(content)
     act = parse_intervention(fields)
     assert content == DueIntervention(step, OUTSIDE, 0, act).record
 
 
-def test_a_lasting_intervention_lasts_its_time_after_each_event() -> None:
+def test_a_lasting_intervention_lasts_its_time_after_each_event():
     """The end of the first ended those that had begun meanwhile, too."""
     interventions = InterventionQueue(Clock(datetime(2026, 1, 5), 1_000_000, 3600))
     dark = parse_intervention({"fault": "astro", "dark": True, "duration": "1 min"})

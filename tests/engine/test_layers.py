@@ -116,7 +116,7 @@ def by_brute_force(stored: Any, robot: str, camera: Mapping[str, Any]) -> I64:
 
 
 @pytest.fixture(scope="module")
-def stored() -> Any:
+def stored():
     return run(watched("3 min"), metrics={})
 
 
@@ -124,9 +124,7 @@ def stored() -> Any:
 @pytest.mark.parametrize(
     ("robot", "camera"), [("astro", CAMERA), ("drift", {"range": [0, 2], "angle_deg": 200})]
 )
-def test_explored_is_the_union_of_what_brute_force_sees_at_each_step(
-    stored: Any, robot: str, camera: Mapping[str, Any]
-) -> None:
+def test_explored_is_the_union_of_what_brute_force_sees_at_each_step(stored, robot, camera):
     times, first, last = by_brute_force(stored, robot, camera)
 
     assert np.array_equal(times > 0, read_layer(stored, f"explored.{robot}"))
@@ -137,7 +135,7 @@ def test_explored_is_the_union_of_what_brute_force_sees_at_each_step(
     assert (times > 0).sum() > 500
 
 
-def test_exposure_is_what_brute_force_counts_and_costs_nothing_else() -> None:
+def test_exposure_is_what_brute_force_counts_and_costs_nothing_else():
     content = watched("3 min", algorithms={"seen": {"type": f"{HERE}:Expose", "period": "1 min"}})
     content["floorplan"].pop("layers")
     stored = run(content)
@@ -156,7 +154,7 @@ def test_exposure_is_what_brute_force_counts_and_costs_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("span", some([7, 1, 100], 3))
-def test_layers_are_the_same_for_every_max_span(span: int) -> None:
+def test_layers_are_the_same_for_every_max_span(span):
     content = everything("20 min")
     content["floorplan"] = {
         **content["floorplan"],
@@ -168,7 +166,7 @@ def test_layers_are_the_same_for_every_max_span(span: int) -> None:
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
-def test_run_with_layers_is_otherwise_the_run_without() -> None:
+def test_run_with_layers_is_otherwise_the_run_without():
     plain, layered = everything("10 min"), everything("10 min")
     layered["floorplan"] = {**layered["floorplan"], "layers": SEEN}
     before, after = digests(run(plain)), digests(run(layered))
@@ -178,7 +176,7 @@ def test_run_with_layers_is_otherwise_the_run_without() -> None:
     }
 
 
-def test_layer_is_stored_when_it_is_due_and_at_the_end() -> None:
+def test_layer_is_stored_when_it_is_due_and_at_the_end():
     content = scenario("10 min", algorithms={"dirt": {"type": f"{HERE}:Dirt", "period": "1 min"}})
     stored = run(content)
 
@@ -194,7 +192,7 @@ def test_layer_is_stored_when_it_is_due_and_at_the_end() -> None:
         read_layer(stored, "dusk")
 
 
-def test_layer_without_rows_was_never_stored() -> None:
+def test_layer_without_rows_was_never_stored():
     content = scenario("1 min", algorithms={"dirt": {"type": f"{HERE}:Dirt", "period": "1 min"}})
     rows = run(content).tables["layer.dust"]
     empty: Any = SimpleNamespace(tables={"layer.dust": rows.slice(0, 0)})
@@ -203,7 +201,7 @@ def test_layer_without_rows_was_never_stored() -> None:
         read_layer(empty, "dust")
 
 
-def test_entities_and_algorithms_write_to_one_layer_and_spans_do_not_show() -> None:
+def test_entities_and_algorithms_write_to_one_layer_and_spans_do_not_show():
     content = scenario(
         "10 min",
         robots={"astro": {"type": f"{HERE}:Sweep"}},
@@ -217,7 +215,7 @@ def test_entities_and_algorithms_write_to_one_layer_and_spans_do_not_show() -> N
     assert digests(stored) == digests(run(content, max_span=1))
 
 
-def test_branches_have_layers_of_their_own() -> None:
+def test_branches_have_layers_of_their_own():
     content = watched(algorithms={"dirt": {"type": f"{HERE}:Dirt", "period": "1 min"}})
     simulation = Simulation(content)
     simulation.run_until(timedelta(minutes=5))
@@ -243,7 +241,7 @@ def door_flat(folder: Any, **more: Any) -> dict[str, Any]:
     return content
 
 
-def test_a_door_hides_while_it_is_shut_what_is_behind_it(tmp_path: Any) -> None:
+def test_a_door_hides_while_it_is_shut_what_is_behind_it(tmp_path):
     gate = {"type": "door", "doorway": "gate"}
     opened = run(door_flat(tmp_path, objects={"gate": {**gate, "open": True}}))
     shut = run(door_flat(tmp_path, objects={"gate": {**gate, "open": False}}))
@@ -264,7 +262,7 @@ def test_a_door_hides_while_it_is_shut_what_is_behind_it(tmp_path: Any) -> None:
     assert digests(turned) == digests(run(content, max_span=1))
 
 
-def test_layers_of_a_stored_run_are_read_back(tmp_path: Any) -> None:
+def test_layers_of_a_stored_run_are_read_back(tmp_path):
     content = watched("2 min")
     in_memory = run(content)
     stored = fleet2d.run(content, out=tmp_path / "run")
@@ -278,7 +276,7 @@ def test_layers_of_a_stored_run_are_read_back(tmp_path: Any) -> None:
     assert len(layer_names(stored)) == 8
 
 
-def test_seen_area_at_some_steps_is_that_of_these_steps() -> None:
+def test_seen_area_at_some_steps_is_that_of_these_steps():
     content = watched("2 min")
     every = run(content)
     some = run(content, sight={"seen_every": "10 s"})
@@ -303,7 +301,7 @@ def test_seen_area_at_some_steps_is_that_of_these_steps() -> None:
         ),
     ],
 )
-def test_wrong_layers_are_an_error_before_the_run(change: dict[str, Any], why: str) -> None:
+def test_wrong_layers_are_an_error_before_the_run(change, why):
     content = watched()
     for key, value in change.items():
         content[key] = {**content.get(key, {}), **value}
@@ -311,13 +309,13 @@ def test_wrong_layers_are_an_error_before_the_run(change: dict[str, Any], why: s
         Simulation(content)
 
 
-def test_exposure_without_a_word_before_is_an_error_that_says_which() -> None:
+def test_exposure_without_a_word_before_is_an_error_that_says_which():
     content = watched(algorithms={"unsaid": {"type": f"{HERE}:Unsaid", "period": "1 min"}})
     with pytest.raises(Fleet2DError, match=r"needs = {'exposure'}"):
         run(content)
 
 
-def test_nothing_is_watched_when_nobody_asks() -> None:
+def test_nothing_is_watched_when_nobody_asks():
     content = watched()
     content["floorplan"].pop("layers")
     simulation = Simulation(content)

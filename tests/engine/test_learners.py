@@ -71,7 +71,7 @@ def chain(**reads: list[str]) -> dict[str, Algorithm]:
     return {name: algorithm(lambda h, s: None, reads=names) for name, names in reads.items()}
 
 
-def test_who_reads_stands_behind_those_it_reads() -> None:
+def test_who_reads_stands_behind_those_it_reads():
     order = update_order(chain(a=["d", "b"], b=["c"], c=[], d=["c"], e=[]))
     assert {"a", "b", "c", "d", "e"} == set(order)
     position = {name: i for i, name in enumerate(order)}
@@ -79,11 +79,11 @@ def test_who_reads_stands_behind_those_it_reads() -> None:
     assert max(position["b"], position["d"]) < position["a"]
 
 
-def test_without_reads_the_order_is_that_of_the_scenario() -> None:
+def test_without_reads_the_order_is_that_of_the_scenario():
     assert ["z", "m", "a"] == update_order(chain(z=[], m=[], a=[]))
 
 
-def test_a_circle_is_refused_and_named() -> None:
+def test_a_circle_is_refused_and_named():
     with pytest.raises(ScenarioError) as caught:
         fleet2d.Simulation(watched(algorithms=chain(a=["b"], b=["c"], c=["a"], d=[])))
     message = str(caught.value)
@@ -94,12 +94,12 @@ def test_a_circle_is_refused_and_named() -> None:
     assert all(reads[x] == y for x, y in pairwise(circle))
 
 
-def test_reading_itself_is_a_circle() -> None:
+def test_reading_itself_is_a_circle():
     with pytest.raises(ScenarioError, match="a reads a"):
         update_order(chain(a=["a"]))
 
 
-def test_reading_what_is_missing_is_refused_with_what_there_is() -> None:
+def test_reading_what_is_missing_is_refused_with_what_there_is():
     with pytest.raises(ScenarioError) as caught:
         fleet2d.Simulation(watched(algorithms=chain(ltp=[], hangout=["lpt"])))
     for word in ("algorithms.hangout", "'lpt'", "did you mean 'ltp'"):
@@ -107,7 +107,7 @@ def test_reading_what_is_missing_is_refused_with_what_there_is() -> None:
 
 
 @pytest.mark.parametrize("type_", ["ltp_error", "ltp_gap", "rtp_score"])
-def test_a_metric_of_an_algorithm_that_is_missing_is_refused_with_what_there_is(type_: str) -> None:
+def test_a_metric_of_an_algorithm_that_is_missing_is_refused_with_what_there_is(type_):
     with pytest.raises(ScenarioError) as caught:
         fleet2d.Simulation(
             watched(algorithms=chain(ltp=[]), metrics={"error": {"type": type_, "of": "lpt"}})
@@ -116,12 +116,12 @@ def test_a_metric_of_an_algorithm_that_is_missing_is_refused_with_what_there_is(
         assert word in str(caught.value)
 
 
-def test_a_metric_of_an_algorithm_is_refused_where_there_is_none() -> None:
+def test_a_metric_of_an_algorithm_is_refused_where_there_is_none():
     with pytest.raises(ScenarioError, match="There are: none"):
         fleet2d.Simulation(watched(metrics={"error": {"type": "ltp_error", "of": "ltp"}}))
 
 
-def test_a_reader_sees_the_output_of_the_same_step_others_that_of_before() -> None:
+def test_a_reader_sees_the_output_of_the_same_step_others_that_of_before():
     seen: dict[str, list[Any]] = {"reader": [], "behavior": [], "metric": []}
 
     def source(history: History, state: Present) -> Any:
@@ -159,7 +159,7 @@ def test_a_reader_sees_the_output_of_the_same_step_others_that_of_before() -> No
 
 
 @pytest.mark.parametrize("max_span", [None, 7])
-def test_histories_are_whole_periods_without_gaps(max_span: int | None) -> None:
+def test_histories_are_whole_periods_without_gaps(max_span):
     handed: dict[str, list[tuple[int, int, int, datetime]]] = {"a": [], "b": []}
 
     def record(name: str) -> Update:
@@ -192,9 +192,7 @@ def test_histories_are_whole_periods_without_gaps(max_span: int | None) -> None:
     ("period", "expected"),
     [("4 min", [(0, 240), (240, 480), (480, 600)]), ("5 min", [(0, 300), (300, 600)])],
 )
-def test_metrics_get_every_period_once_and_at_the_end_its_rest(
-    period: str, expected: list[tuple[int, int]]
-) -> None:
+def test_metrics_get_every_period_once_and_at_the_end_its_rest(period, expected):
     handed: list[tuple[int, int]] = []
     keep = metric(lambda h, s: handed.append((h.first, h.end)), period=period)
     fleet2d.run(watched("10 min", metrics={"m": keep}))
@@ -202,14 +200,14 @@ def test_metrics_get_every_period_once_and_at_the_end_its_rest(
 
 
 @pytest.mark.parametrize("period", ["1.5 s", "90 ms"])
-def test_a_period_that_is_no_multiple_of_the_step_is_refused(period: str) -> None:
+def test_a_period_that_is_no_multiple_of_the_step_is_refused(period):
     with pytest.raises(ScenarioError) as caught:
         fleet2d.Simulation(watched(algorithms={"a": algorithm(lambda h, s: None, period=period)}))
     for word in ("algorithms.a.period", "multiple", "1 s"):
         assert word in str(caught.value)
 
 
-def test_two_runs_of_one_scenario_do_not_share_state() -> None:
+def test_two_runs_of_one_scenario_do_not_share_state():
     class Count(Algorithm):
         def start(self, home: Home) -> None:
             self.count = 0
@@ -226,7 +224,7 @@ def test_two_runs_of_one_scenario_do_not_share_state() -> None:
 # --- What they are handed ----------------------------------------------------------------------
 
 
-def test_poses_and_observations_of_a_history_are_those_that_are_stored() -> None:
+def test_poses_and_observations_of_a_history_are_those_that_are_stored():
     found: list[Any] = []
 
     def update(history: History, state: Present) -> None:
@@ -265,7 +263,7 @@ def test_poses_and_observations_of_a_history_are_those_that_are_stored() -> None
     assert [rooms[r] for r in rows["room"]] == seen.tolist()
 
 
-def test_algorithms_may_ask_for_robots_but_not_for_users() -> None:
+def test_algorithms_may_ask_for_robots_but_not_for_users():
     def update(history: History, state: Present) -> None:
         assert 60 == len(history.poses("astro").x)
         assert (("ana",), ("astro",)) == (state.users, state.robots)
@@ -277,12 +275,12 @@ def test_algorithms_may_ask_for_robots_but_not_for_users() -> None:
         assert word in str(caught.value)
 
 
-def test_an_unknown_body_is_refused_with_those_there_are() -> None:
+def test_an_unknown_body_is_refused_with_those_there_are():
     with pytest.raises(ComponentError, match=r"no such body.*ana, astro"):
         fleet2d.run(watched(metrics={"m": metric(lambda h, s: h.poses("bob"), period="60 s")}))
 
 
-def test_draws_of_an_algorithm_depend_on_path_purpose_and_step() -> None:
+def test_draws_of_an_algorithm_depend_on_path_purpose_and_step():
     drawn: dict[Any, float] = {}
 
     def update(history: History, state: Present) -> None:
@@ -296,7 +294,7 @@ def test_draws_of_an_algorithm_depend_on_path_purpose_and_step() -> None:
 # --- What is stored ----------------------------------------------------------------------------
 
 
-def test_outputs_become_rows_with_step_and_time() -> None:
+def test_outputs_become_rows_with_step_and_time():
     def update(history: History, state: Present) -> Any:
         return {"n": history.end, "share": 0.5, "late": history.end > 60, "word": f"w{history.end}"}
 
@@ -311,7 +309,7 @@ def test_outputs_become_rows_with_step_and_time() -> None:
     assert ["w60", "w120"] == rows["word"].tolist()
 
 
-def test_arrays_become_a_row_per_entry() -> None:
+def test_arrays_become_a_row_per_entry():
     stored = fleet2d.run(
         watched(
             "1 min",
@@ -328,7 +326,7 @@ def test_arrays_become_a_row_per_entry() -> None:
     assert ["p", "q", "r"] * 2 == rows["y"].tolist()
 
 
-def test_nothing_put_out_is_no_table_and_no_output() -> None:
+def test_nothing_put_out_is_no_table_and_no_output():
     simulation = fleet2d.Simulation(
         watched("2 min", algorithms={"a": algorithm(lambda h, s: None, period="60 s")})
     )
@@ -337,7 +335,7 @@ def test_nothing_put_out_is_no_table_and_no_output() -> None:
     assert {} == simulation.outputs
 
 
-def test_an_output_of_none_keeps_the_one_before() -> None:
+def test_an_output_of_none_keeps_the_one_before():
     update = lambda h, s: {"end": h.end} if h.end == 60 else None  # noqa: E731
     simulation = fleet2d.Simulation(
         watched("3 min", algorithms={"a": algorithm(update, period="60 s")})
@@ -347,14 +345,14 @@ def test_an_output_of_none_keeps_the_one_before() -> None:
 
 
 @pytest.mark.parametrize("name", ["events", "trajectories", "observations", "key_frames"])
-def test_an_algorithm_may_be_called_like_a_table_of_the_engine(name: str) -> None:
+def test_an_algorithm_may_be_called_like_a_table_of_the_engine(name):
     stored = fleet2d.run(
         watched("2 min", algorithms={name: algorithm(lambda h, s: {"n": 1}, period="60 s")})
     )
     assert [1, 1] == table(stored, f"algorithms_{name}")["n"].tolist()
 
 
-def test_an_algorithm_and_a_metric_of_one_name_have_a_table_each() -> None:
+def test_an_algorithm_and_a_metric_of_one_name_have_a_table_each():
     stored = fleet2d.run(
         watched(
             "2 min",
@@ -366,7 +364,7 @@ def test_an_algorithm_and_a_metric_of_one_name_have_a_table_each() -> None:
     assert [0.5, 0.5] == table(stored, "metrics_same")["other"].tolist()
 
 
-def test_fractions_where_whole_numbers_came_first_are_refused() -> None:
+def test_fractions_where_whole_numbers_came_first_are_refused():
     update = lambda h, s: {"mean": 0 if h.end == 60 else 0.5}  # noqa: E731
     with pytest.raises((ComponentError, ArtifactError)) as caught:
         fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period="60 s")}))
@@ -374,19 +372,19 @@ def test_fractions_where_whole_numbers_came_first_are_refused() -> None:
         assert word in str(caught.value)
 
 
-def test_whole_numbers_where_fractions_came_first_are_stored() -> None:
+def test_whole_numbers_where_fractions_came_first_are_stored():
     update = lambda h, s: {"mean": 0.5 if h.end == 60 else 1}  # noqa: E731
     stored = fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period="60 s")}))
     assert [0.5, 1.0] == table(stored, "a")["mean"].tolist()
 
 
-def test_other_columns_than_before_are_refused() -> None:
+def test_other_columns_than_before_are_refused():
     update = lambda h, s: {"x": 1} if h.end == 60 else {"x": 1, "y": 2}  # noqa: E731
     with pytest.raises(ComponentError, match=r"algorithms\.a returned x, y, but x before"):
         fleet2d.run(watched("2 min", algorithms={"a": algorithm(update, period="60 s")}))
 
 
-def test_what_one_component_does_to_its_history_is_not_seen_by_others() -> None:
+def test_what_one_component_does_to_its_history_is_not_seen_by_others():
     seen: list[list[float]] = []
 
     def spoil(history: History, state: Present) -> None:
@@ -405,7 +403,7 @@ def test_what_one_component_does_to_its_history_is_not_seen_by_others() -> None:
     assert seen[0::2] == seen[1::2]
 
 
-def test_outputs_may_be_left_unstored() -> None:
+def test_outputs_may_be_left_unstored():
     content = watched(
         "2 min",
         algorithms={"a": algorithm(lambda h, s: {"n": 1}, period="60 s")},
@@ -437,7 +435,7 @@ def test_outputs_may_be_left_unstored() -> None:
         (lambda s: 1 / 0, ["ZeroDivisionError"]),
     ],
 )
-def test_an_output_that_can_not_be_is_an_error_with_a_name(output: Any, words: list[str]) -> None:
+def test_an_output_that_can_not_be_is_an_error_with_a_name(output, words):
     with pytest.raises((ComponentError, ArtifactError)) as caught:
         fleet2d.run(
             watched("2 min", algorithms={"mine": algorithm(lambda h, s: output(s), period="60 s")})
@@ -446,7 +444,7 @@ def test_an_output_that_can_not_be_is_an_error_with_a_name(output: Any, words: l
         assert word in str(caught.value)
 
 
-def test_an_algorithm_that_fails_to_start_is_named() -> None:
+def test_an_algorithm_that_fails_to_start_is_named():
     class Broken(Algorithm):
         def start(self, home: Home) -> None:
             raise OSError("no such model")
@@ -457,7 +455,7 @@ def test_an_algorithm_that_fails_to_start_is_named() -> None:
         fleet2d.Simulation(watched(algorithms={"a": Broken()}))
 
 
-def test_the_history_is_the_same_whatever_else_is_due_meanwhile() -> None:
+def test_the_history_is_the_same_whatever_else_is_due_meanwhile():
     def record(history: History, state: Present) -> Any:
         poses = history.poses("astro")
         return {

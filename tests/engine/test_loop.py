@@ -63,21 +63,19 @@ def told(duration: str = "150 s", **more: Any) -> dict[str, Any]:
 
 
 @pytest.fixture
-def story() -> Iterator[list[tuple[int, str]]]:
+def story():
     STORY.clear()
     yield STORY
     STORY.clear()
 
 
-def test_phases_come_in_the_order_of_the_paper() -> None:
+def test_phases_come_in_the_order_of_the_paper():
     names = ["intervene", "change_home", "decide", "move", "watch", "record", "learn"]
     assert names == [phase.__name__ for phase in PHASES]
 
 
 @pytest.mark.parametrize("span", [None, 1, 7])
-def test_in_a_step_come_home_users_robots_algorithms_metrics(
-    story: list[tuple[int, str]], span: int | None
-) -> None:
+def test_in_a_step_come_home_users_robots_algorithms_metrics(story, span):
     run(told(), max_span=span)
     names = ("zoe", "ana", "bolt", "astro")
     learned = [(59, "algorithm"), (59, "metric after 59")]
@@ -92,7 +90,7 @@ def test_in_a_step_come_home_users_robots_algorithms_metrics(
     ]
 
 
-def test_what_a_script_does_at_a_step_comes_before_all_else(story: list[tuple[int, str]]) -> None:
+def test_what_a_script_does_at_a_step_comes_before_all_else(story):
     simulation = fleet2d.Simulation(told())
     simulation.advance(30)
     simulation.do(ShutDoor("door"))
@@ -115,7 +113,7 @@ def spans_of(simulation: fleet2d.Simulation, end: int) -> Iterator[tuple[Span, i
 
 
 @pytest.mark.parametrize("max_span", [None, 61])
-def test_a_span_ends_where_something_is_due_and_not_before(max_span: int | None) -> None:
+def test_a_span_ends_where_something_is_due_and_not_before(max_span):
     content = everything("30 min")
     content["objects"] = {"door": {"type": "door", "doorway": "living_room_1-kitchen_1"}}
     content["script"] = [{"at": "10 min", "shut": "door"}]
@@ -142,7 +140,7 @@ def test_a_span_ends_where_something_is_due_and_not_before(max_span: int | None)
     assert 1800 == begun
 
 
-def test_watchers_that_nobody_waits_for_take_in_many_spans_at_once() -> None:
+def test_watchers_that_nobody_waits_for_take_in_many_spans_at_once():
     content = scenario(
         "1 h",
         users={"ana": {"type": "meander"}},
@@ -158,7 +156,7 @@ def test_watchers_that_nobody_waits_for_take_in_many_spans_at_once() -> None:
     assert digests(run(content)) == digests(simulation.finish())
 
 
-def test_when_a_run_settles_all_watchers_have_taken_in_the_same_steps() -> None:
+def test_when_a_run_settles_all_watchers_have_taken_in_the_same_steps():
     simulation = fleet2d.Simulation(everything("20 min"))
     simulation.advance(333)
     simulation._state.settle(simulation.step)

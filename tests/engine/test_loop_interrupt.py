@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,7 +25,7 @@ def interrupt_after(seconds: float) -> threading.Timer:
 
 
 @pytest.mark.slow
-def test_an_interrupted_run_is_whole_until_where_it_stopped(tmp_path: Path) -> None:
+def test_an_interrupted_run_is_whole_until_where_it_stopped(tmp_path):
     simulation = fleet2d.Simulation(endless(), out=tmp_path / "run")
     timer = interrupt_after(0.5)
     with pytest.raises(KeyboardInterrupt):
@@ -41,7 +40,7 @@ def test_an_interrupted_run_is_whole_until_where_it_stopped(tmp_path: Path) -> N
     assert digests(run(every_step(f"{steps} s"))) == digests(stored)
 
 
-def test_a_paced_run_stops_soon() -> None:
+def test_a_paced_run_stops_soon():
     simulation = fleet2d.Simulation(
         scenario("1 d", users={"ana": {"type": "meander"}}), speedup=1.0
     )
@@ -52,7 +51,7 @@ def test_a_paced_run_stops_soon() -> None:
     assert simulation.step < 3600
 
 
-def test_a_second_interrupt_does_not_wait_for_the_span_to_end() -> None:
+def test_a_second_interrupt_does_not_wait_for_the_span_to_end():
     impatient = {"type": f"{OWN}:Impatient", "period": "1 min"}
     simulation = fleet2d.Simulation(scenario("10 min", algorithms={"impatient": impatient}))
     with pytest.raises(KeyboardInterrupt):
@@ -60,13 +59,13 @@ def test_a_second_interrupt_does_not_wait_for_the_span_to_end() -> None:
     assert ["first", "second"] == simulation._state.learners.all[0].component.lived_to_see
 
 
-def test_the_handler_of_the_caller_is_put_back() -> None:
+def test_the_handler_of_the_caller_is_put_back():
     before = signal.getsignal(signal.SIGINT)
     run(scenario("1 min", users={"ana": {"type": "meander"}}))
     assert before is signal.getsignal(signal.SIGINT)
 
 
-def test_a_run_in_another_thread_leaves_signals_alone() -> None:
+def test_a_run_in_another_thread_leaves_signals_alone():
     done: list[Any] = []
     thread = threading.Thread(target=lambda: done.append(run(scenario("1 min")).status))
     thread.start()

@@ -35,7 +35,7 @@ class Wall:
 
 
 @pytest.fixture
-def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
+def wall(monkeypatch):
     clock = Wall()
     monkeypatch.setattr("fleet2d.engine.loop.time", clock)
     return clock
@@ -43,9 +43,7 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
 
 @pytest.mark.parametrize("look_s", [0.0, 0.01])
 @pytest.mark.parametrize(("speedup", "duration_s"), [(100, 60), (3600, 3600), (10_000.5, 7200)])
-def test_the_factor_is_held_within_two_percent(
-    wall: Wall, speedup: float, duration_s: int, look_s: float
-) -> None:
+def test_the_factor_is_held_within_two_percent(wall, speedup, duration_s, look_s):
     wall.look_s = look_s
     simulation = fleet2d.Simulation(content(f"{duration_s} s", speedup))
     began = wall.now
@@ -55,12 +53,12 @@ def test_the_factor_is_held_within_two_percent(
     assert duration_s / speedup == pytest.approx(wall.now - began, rel=0.02, abs=slack)
 
 
-def test_real_time_is_held_in_steps_longer_than_a_look_at_the_clock(wall: Wall) -> None:
+def test_real_time_is_held_in_steps_longer_than_a_look_at_the_clock(wall):
     fleet2d.Simulation(content("4 s", 8)).advance(4)
     assert 0.5 == pytest.approx(wall.now)
 
 
-def test_a_pause_between_two_calls_is_not_caught_up(wall: Wall) -> None:
+def test_a_pause_between_two_calls_is_not_caught_up(wall):
     simulation = fleet2d.Simulation(content("20 s", 2))
     simulation.advance(10)
     wall.now += 100
@@ -68,18 +66,18 @@ def test_a_pause_between_two_calls_is_not_caught_up(wall: Wall) -> None:
     assert 110 == pytest.approx(wall.now)
 
 
-def test_it_is_never_faster_than_asked() -> None:
+def test_it_is_never_faster_than_asked():
     simulation = fleet2d.Simulation(content("60 s", 200))
     began = time.perf_counter()
     simulation.advance(10**9)
     assert time.perf_counter() - began >= 60 / 200
 
 
-def test_the_pace_changes_no_table() -> None:
+def test_the_pace_changes_no_table():
     assert digests(run(content("5 min", None))) == digests(run(content("5 min", 2000)))
 
 
-def test_a_factor_out_of_reach_is_reported() -> None:
+def test_a_factor_out_of_reach_is_reported():
     tick = {"tick": {"type": f"{OWN}:Tick", "period": "1 s"}}
     stored = run(content("20 min", 1e9, algorithms=tick))
     (note,) = [note for note in stored.notes if "speedup" in note]
@@ -87,11 +85,11 @@ def test_a_factor_out_of_reach_is_reported() -> None:
         assert word in note
 
 
-def test_a_factor_that_is_held_is_not_reported(wall: Wall) -> None:
+def test_a_factor_that_is_held_is_not_reported(wall):
     assert [] == [note for note in run(content("1 min", 200)).notes if "speedup" in note]
 
 
-def test_a_pace_never_sleeps_when_it_is_behind(wall: Wall) -> None:
+def test_a_pace_never_sleeps_when_it_is_behind(wall):
     pace = Pace(1.0)
     pace.hold(0)
     pace.hold(-5)

@@ -9,7 +9,6 @@ import json
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -39,7 +38,7 @@ def base() -> Run:
     return lived()
 
 
-def test_the_loop_is_closed() -> None:
+def test_the_loop_is_closed():
     """Without it the robot is somewhere else: what it learns moves it."""
     events = table(base(), "events", entity="astro")["event"]
     assert {"relocates", "explores"} <= set(events)
@@ -48,13 +47,13 @@ def test_the_loop_is_closed() -> None:
 
 
 @pytest.mark.parametrize("span", some([61, 997], 2))
-def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
+def test_every_table_is_the_same_for_every_max_span(span):
     other = lived(max_span=span)
     assert digests(base()) == digests(other)
     assert base().metrics == other.metrics
 
 
-def test_every_table_is_the_same_step_by_step() -> None:
+def test_every_table_is_the_same_step_by_step():
     users = {"ana": {"type": "meander"}}
     robots = {
         "astro": {
@@ -77,7 +76,7 @@ def test_every_table_is_the_same_step_by_step() -> None:
         assert whole.metrics == other.metrics
 
 
-def test_metrics_change_nothing_that_is_learned_or_lived() -> None:
+def test_metrics_change_nothing_that_is_learned_or_lived():
     loaded = fleet2d.load_scenario("bundled:paper", *LEARNS)
     without = fleet2d.run(loaded.model_copy(update={"metrics": {}}))
     assert {} == without.metrics
@@ -91,7 +90,7 @@ def test_metrics_change_nothing_that_is_learned_or_lived() -> None:
     ["[]", "[{type: hangout, source: ltp, explore: 60 %}]", "[{type: follow}, {type: patrol}]"],
     ids=["nothing", "another hangout", "following"],
 )
-def test_users_live_the_same_whatever_the_robot_does(behaviors: str) -> None:
+def test_users_live_the_same_whatever_the_robot_does(behaviors):
     other = lived(f"robots.astro.behaviors={behaviors}")
     assert digests(base())["key_frames"] != digests(other)["key_frames"]
     for name in ("key_frames", "trajectories", "events"):
@@ -104,7 +103,7 @@ def test_users_live_the_same_whatever_the_robot_does(behaviors: str) -> None:
 
 
 @pytest.mark.parametrize("at", some([20_000, 1], 2))
-def test_branches_of_a_learning_run_live_the_same_future(at: int) -> None:
+def test_branches_of_a_learning_run_live_the_same_future(at):
     simulation = fleet2d.Simulation("bundled:paper", *LEARNS)
     simulation.advance(at)
     twin = copy.deepcopy(simulation)
@@ -120,7 +119,7 @@ def digest_of(seed: int) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", some([1, 2, 3], 3))
-def test_runs_in_any_number_of_processes_are_those_of_one(workers: int) -> None:
+def test_runs_in_any_number_of_processes_are_those_of_one(workers):
     expected = [base().digest, digest_of(5)]
     assert expected[0] != expected[1]
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
@@ -151,7 +150,7 @@ print(fleet2d.run("bundled:paper", *json.loads(sys.argv[1])).digest)
     ),
     ids=lambda environment: f"{environment['OMP_NUM_THREADS']} threads",
 )
-def test_another_process_learns_the_same(environment: dict[str, str], tmp_path: Path) -> None:
+def test_another_process_learns_the_same(environment, tmp_path):
     """What is learned is worked out from floats: their sums may depend on nothing but the data."""
     done = process("-c", SCRIPT, json.dumps(LEARNS), timeout=300, cwd=tmp_path, **environment)
     assert 0 == done.returncode, done.stderr

@@ -80,9 +80,7 @@ def name(cls: type) -> str:
         ("lines", "ValueError: 0\n1\n"),
     ],
 )
-def test_code_that_ends_the_run_is_named_and_the_run_kept(
-    tmp_path: Path, how: str, what: str
-) -> None:
+def test_code_that_ends_the_run_is_named_and_the_run_kept(tmp_path, how, what):
     algorithms = {"ends": {"type": name(Ends), "how": how}}
     with pytest.raises(ComponentError) as caught:
         fleet2d.run(small(algorithms=algorithms), seed=4, out=tmp_path / "run")
@@ -124,7 +122,7 @@ class Prints(fleet2d.Algorithm):
 
 
 @pytest.mark.slow
-def test_what_components_print_goes_to_stderr_with_json(tmp_path: Path) -> None:
+def test_what_components_print_goes_to_stderr_with_json(tmp_path):
     (tmp_path / "mine.py").write_text(MODULE)
     override = "algorithms.own.type=mine:Prints"
     done = fleet2d_process("run", "simulation.duration=2 h", override, "--json", cwd=tmp_path)
@@ -134,7 +132,7 @@ def test_what_components_print_goes_to_stderr_with_json(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_exit_in_an_update_is_exit_code_1(tmp_path: Path) -> None:
+def test_an_exit_in_an_update_is_exit_code_1(tmp_path):
     (tmp_path / "mine.py").write_text(MODULE)
     override = "algorithms.own={type: mine:Prints, how: exit}"
     done = fleet2d_process("run", "simulation.duration=3 h", override, "--out", "a", cwd=tmp_path)
@@ -152,7 +150,7 @@ def run_prints(folder: Path, how: str, duration: str = "3 h") -> subprocess.Comp
 
 @pytest.mark.slow
 @pytest.mark.parametrize("how", some(["gone", "gone in a thread", "gone as a thread"], 3))
-def test_a_component_that_ends_the_process_leaves_the_run(tmp_path: Path, how: str) -> None:
+def test_a_component_that_ends_the_process_leaves_the_run(tmp_path, how):
     """What was committed can be read, and the run can be resumed."""
     done = run_prints(tmp_path, how, "2 d")
     assert 0 == done.returncode  # what the component says: nobody is left to say more
@@ -166,14 +164,12 @@ def test_a_component_that_ends_the_process_leaves_the_run(tmp_path: Path, how: s
 
 
 @pytest.mark.slow
-def test_a_child_process_of_a_component_may_end(tmp_path: Path) -> None:
+def test_a_child_process_of_a_component_may_end(tmp_path):
     assert 0 == run_prints(tmp_path, "forks").returncode
 
 
 @pytest.mark.parametrize("code", ["import sys; sys.exit(0)", "raise SystemExit", "exit(3)"])
-def test_an_exit_at_import_is_an_error(
-    tmp_path: Path, code: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_exit_at_import_is_an_error(tmp_path, code, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("mine.py").write_text(f"class C: pass\n{code}\n")
     with pytest.raises(ScenarioError, match=r"can't import 'mine:C': mine\.py:2: SystemExit"):
@@ -232,9 +228,7 @@ class Odd(fleet2d.Algorithm):
         3,
     ),
 )
-def test_code_that_ends_the_program_before_the_run_is_named(
-    tmp_path: Path, how: str, words: str
-) -> None:
+def test_code_that_ends_the_program_before_the_run_is_named(tmp_path, how, words):
     """Some ended it with code 0 or 130, without a word."""
     (tmp_path / "mine.py").write_text(ODD)
     override = f"algorithms.odd={{type: mine:Odd, how: '{how}'}}"
@@ -268,8 +262,8 @@ class Stops(fleet2d.Algorithm):
     ),
 )
 def test_a_signal_during_the_code_of_a_component_is_not_its_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: str, command: tuple[str, ...]
-) -> None:
+    tmp_path, monkeypatch, number, command
+):
     monkeypatch.setenv("STOP", number)
     (tmp_path / "mine.py").write_text(STOPS)
     algorithms = {"own": {"type": "mine:Stops"}}
@@ -286,7 +280,7 @@ def test_a_signal_during_the_code_of_a_component_is_not_its_error(
 @pytest.mark.parametrize(
     "code", some(["raise KeyboardInterrupt", "class B(BaseException): pass\nraise B"], 2)
 )
-def test_no_exception_at_import_ends_the_program(tmp_path: Path, code: str) -> None:
+def test_no_exception_at_import_ends_the_program(tmp_path, code):
     (tmp_path / "mine.py").write_text(code)
     done = fleet2d_process("run", "metrics.odd.type=mine:Odd", cwd=tmp_path)
     assert 2 == done.returncode
@@ -295,7 +289,7 @@ def test_no_exception_at_import_ends_the_program(tmp_path: Path, code: str) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("is_at_import", some([True, False], 2))
-def test_a_run_is_stored_where_it_was_begun(tmp_path: Path, is_at_import: bool) -> None:
+def test_a_run_is_stored_where_it_was_begun(tmp_path, is_at_import):
     """A component that changes the current folder had its run stored, and then not found."""
     (tmp_path / "mine.py").write_text(f"{ODD}\nos.chdir('/')" if is_at_import else ODD)
     override = "algorithms.odd={type: mine:Odd, how: chdir, period: 10 min}"
@@ -308,7 +302,7 @@ def test_a_run_is_stored_where_it_was_begun(tmp_path: Path, is_at_import: bool) 
     assert (tmp_path / "a/learned/ltp.npz").is_file()
 
 
-def test_an_error_of_remember_is_noted(tmp_path: Path) -> None:
+def test_an_error_of_remember_is_noted(tmp_path):
     (tmp_path / "mine.py").write_text(ODD)
     odd = {"type": f"{tmp_path.as_posix()}/mine:Odd", "how": "remember"}
     content = small(algorithms={"odd": odd}, artifacts={"learned": True})
@@ -326,7 +320,7 @@ class WithoutPeriod(Algorithm):
         """Do nothing."""
 
 
-def test_an_impossible_period_of_a_class_is_named() -> None:
+def test_an_impossible_period_of_a_class_is_named():
     with pytest.raises(ComponentError, match=r"algorithms\.odd failed when it was started: TypeE"):
         fleet2d.run(small(algorithms={"odd": {"type": name(WithoutPeriod)}}), seed=4)
 
@@ -372,7 +366,7 @@ def writable_arrays(value: Any, depth: int) -> list[str]:
     return [f"{key}.{at}" for key, entry in items for at in writable_arrays(entry, depth - 1)]
 
 
-def test_arrays_of_the_history_are_read_only() -> None:
+def test_arrays_of_the_history_are_read_only():
     Writes.writable = []
     metrics = {"writes": {"type": name(Writes), "period": "1 h"}}
     fleet2d.run(small(metrics=metrics), seed=4)
@@ -386,15 +380,13 @@ class Stays(Behavior):
         return now.plan().stay(timedelta.max)
 
 
-def test_a_stay_of_millions_of_years_is_refused() -> None:
+def test_a_stay_of_millions_of_years_is_refused():
     with pytest.raises(ComponentError, match=r"users\.ana.*1000 years"):
         fleet2d.run(small(users={"ana": {"type": name(Stays)}}), seed=4)
 
 
 @pytest.mark.slow
-def test_a_component_that_keeps_the_run_waiting_is_named(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_component_that_keeps_the_run_waiting_is_named(capsys):
     with watched(0.05), blame("algorithms.slow", 7):
         time.sleep(1.0)
     said = capsys.readouterr().err.splitlines()

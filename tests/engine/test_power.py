@@ -76,9 +76,7 @@ def is_off(stored: Run, steps: Any) -> Any:
         ({"power": "astro", "state": "crash", "duration": "2 min"}, "crash", 120),
     ],
 )
-def test_a_robot_that_is_off_neither_moves_nor_sees_until_it_is_on_again(
-    act: dict[str, Any], reason: str, lasts: int | None
-) -> None:
+def test_a_robot_that_is_off_neither_moves_nor_sees_until_it_is_on_again(act, reason, lasts):
     stored = same_for_every_span(home({"at": "07:03:07", **act}))
     expected = [(187, "power_off", reason)]
     if lasts is not None:
@@ -93,7 +91,7 @@ def test_a_robot_that_is_off_neither_moves_nor_sees_until_it_is_on_again(
     assert not is_off(stored, table(stored, "observations")["step"]).any()
 
 
-def test_it_goes_on_where_it_stopped_and_has_forgotten_what_it_was_doing() -> None:
+def test_it_goes_on_where_it_stopped_and_has_forgotten_what_it_was_doing():
     stored = run(home({"at": "07:03:07", "power": "astro", "duration": "10 min"}))
     whole = run(home())
     poses = path(stored, "astro")
@@ -139,13 +137,13 @@ def test_it_goes_on_where_it_stopped_and_has_forgotten_what_it_was_doing() -> No
         ([{"on": ["power_off", "astro"], "delay": "30 s", "power": "astro", "state": "on"}, {"at": "07:05", "power": "astro"}], [300, 330]),
     ],
 )  # fmt: skip
-def test_when_it_is_off(script: list[dict[str, Any]], times: list[int]) -> None:
+def test_when_it_is_off(script, times):
     stored = same_for_every_span(home(*script), 1)
 
     assert times == [step for step, *_ in events(stored, *POWER)]
 
 
-def test_nobody_who_is_in_view_stays_in_view_of_a_robot_that_is_off() -> None:
+def test_nobody_who_is_in_view_stays_in_view_of_a_robot_that_is_off():
     watches = {
         "camera": {"range": [0.3, 5], "angle_deg": 360, "latency": "3 s"},
         "behaviors": [STAYS],
@@ -161,7 +159,7 @@ def test_nobody_who_is_in_view_stays_in_view_of_a_robot_that_is_off() -> None:
     assert not ((seen >= 900) & (seen < 1020 + 3)).any()
 
 
-def test_an_empty_battery_switches_it_off_and_the_charger_on_again() -> None:
+def test_an_empty_battery_switches_it_off_and_the_charger_on_again():
     """Somebody carries it to its charger: it is on again with 5 %, and lost for a minute."""
     put = {"at": "08:00", "put": "astro", "to": BATTERY["charger"]}
     content = home(put, duration="65 min", astro={"battery": BATTERY}, metrics={"uptime": {}})
@@ -177,7 +175,7 @@ def test_an_empty_battery_switches_it_off_and_the_charger_on_again() -> None:
     assert uptime == pytest.approx(stored.metrics["uptime"]["astro"])
 
 
-def test_a_charge_that_is_set_lets_an_empty_robot_go_on_at_once() -> None:
+def test_a_charge_that_is_set_lets_an_empty_robot_go_on_at_once():
     charge = {"at": "08:00", "battery": "astro", "charge": "50 %"}
     stored = same_for_every_span(home(charge, duration="2 h", astro={"battery": BATTERY}), 1)
 
@@ -185,14 +183,14 @@ def test_a_charge_that_is_set_lets_an_empty_robot_go_on_at_once() -> None:
     assert np.ptp(path(stored, "astro").x[3601:3700]) > 1
 
 
-def test_switching_an_empty_robot_on_does_not_help() -> None:
+def test_switching_an_empty_robot_on_does_not_help():
     on = {"at": "08:00", "power": "astro", "state": "on"}
     stored = run(home(on, duration="2 h", astro={"battery": BATTERY}))
 
     assert [] == events(stored, "power_on")
 
 
-def test_the_charge_does_not_fall_while_it_is_off() -> None:
+def test_the_charge_does_not_fall_while_it_is_off():
     simulation = fleet2d.Simulation(
         home({"at": "07:05", "power": "astro", "duration": "30 min"}, astro={"battery": BATTERY})
     )
@@ -207,9 +205,7 @@ def test_the_charge_does_not_fall_while_it_is_off() -> None:
 @pytest.mark.parametrize(
     ("persists", "keeps"), [(None, True), (["ltp", "place"], True), (["place"], False)]
 )
-def test_what_it_has_learned_outlasts_its_time_off_if_it_persists(
-    persists: Any, keeps: bool
-) -> None:
+def test_what_it_has_learned_outlasts_its_time_off_if_it_persists(persists, keeps):
     power = {"at": "07:25", "power": "astro", "duration": "10 min"}
     content = home(power, algorithms=LEARNERS, astro={"power": {"persists": persists}})
     stored = same_for_every_span(content, 1)
@@ -222,7 +218,7 @@ def test_what_it_has_learned_outlasts_its_time_off_if_it_persists(
 
 
 @pytest.mark.parametrize("model", ["hmm", "last_seen", "learned", "semi_markov"])
-def test_real_time_presence_begins_anew_after_a_time_off(model: str) -> None:
+def test_real_time_presence_begins_anew_after_a_time_off(model):
     """What was seen in the same period before the crash is forgotten, too."""
     shares = []
     for state in ("crash", "on"):
@@ -244,7 +240,7 @@ def test_real_time_presence_begins_anew_after_a_time_off(model: str) -> None:
     assert whole[899] > 0.85
 
 
-def test_several_robots_lose_what_they_know_only_when_none_is_on() -> None:
+def test_several_robots_lose_what_they_know_only_when_none_is_on():
     off = {"at": "07:13", "power": "astro", "duration": "5 min"}
     bolt = {"bolt": {"camera": CAMERA, "behaviors": [PATROL]}}
     known_from = []
@@ -256,7 +252,7 @@ def test_several_robots_lose_what_they_know_only_when_none_is_on() -> None:
     assert [[0, 0], [0, 1080]] == known_from
 
 
-def test_the_map_is_lost_unless_it_persists() -> None:
+def test_the_map_is_lost_unless_it_persists():
     layers = {"explored": {}}
     shares = []
     for persists in (["place"], ["place", "map"]):
@@ -274,7 +270,7 @@ def test_the_map_is_lost_unless_it_persists() -> None:
 
 
 @pytest.mark.parametrize("relocalizes", [None, "20 s"])
-def test_a_robot_that_keeps_no_place_is_lost_at_first(relocalizes: str | None) -> None:
+def test_a_robot_that_keeps_no_place_is_lost_at_first(relocalizes):
     astro = {
         "power": {"persists": ["map"]},
         "localization": {"drift": "1 cm", "relocalizes": relocalizes},
@@ -287,7 +283,7 @@ def test_a_robot_that_keeps_no_place_is_lost_at_first(relocalizes: str | None) -
     assert [621 if relocalizes else 661] == [step for step, *_ in events(stored, "relocalized")]
 
 
-def test_carried_while_off_it_believes_to_be_where_it_went_off() -> None:
+def test_carried_while_off_it_believes_to_be_where_it_went_off():
     script = [
         {"at": "07:05", "power": "astro", "duration": "5 min"},
         {"at": "07:07", "put": "astro", "to": "bathroom"},
@@ -307,7 +303,7 @@ def test_carried_while_off_it_believes_to_be_where_it_went_off() -> None:
     assert (off.x / units, off.y / units) == pytest.approx(moved, abs=1e-6)
 
 
-def test_crashes_come_from_the_robots_own_stream() -> None:
+def test_crashes_come_from_the_robots_own_stream():
     power = {"crashes": {"per_day": 12, "lasts": "2 min"}}
     stored = same_for_every_span(home(duration="1 d", astro={"power": power}), 5000)
     again = run(home(duration="1 d", astro={"power": power}, robots={"bolt": {"type": "patrol"}}))
@@ -319,7 +315,7 @@ def test_crashes_come_from_the_robots_own_stream() -> None:
     assert {"crash"} == {detail for *_, detail in events(stored, *POWER)}
 
 
-def test_updates_are_at_night_and_so_many_days_apart() -> None:
+def test_updates_are_at_night_and_so_many_days_apart():
     power = {"updates": {"during": "02:00-04:00", "lasts": "10 min", "every": "2 d"}}
     stored = run(home(duration="6 d", astro={"power": power}, metrics={"uptime": {}}))
     hours = [((step + 7 * 3600) / 3600) % 24 for step, *_ in events(stored, "power_off")]
@@ -330,11 +326,11 @@ def test_updates_are_at_night_and_so_many_days_apart() -> None:
     assert 1 - 30 / (6 * 1440) == pytest.approx(stored.metrics["uptime"]["astro"]["on"])
 
 
-def test_without_power_of_its_own_the_streams_of_a_run_are_as_before() -> None:
+def test_without_power_of_its_own_the_streams_of_a_run_are_as_before():
     assert digests(run(home())) == digests(run(home(astro={"power": {"persists": ["map"]}})))
 
 
-def test_a_search_that_was_cut_off_begins_again() -> None:
+def test_a_search_that_was_cut_off_begins_again():
     crash = {"on": ["find_begins", "astro"], "delay": "3 s", "power": "astro", "state": "crash"}
     content = home(crash, {"at": "0 s", "hold": "ana"})
     find = {"type": "find", "user": "ana", "every": "20 min"}
@@ -345,7 +341,7 @@ def test_a_search_that_was_cut_off_begins_again() -> None:
     assert kinds == [kind for _, kind, _ in happened[:5]]
 
 
-def test_behaviors_that_hold_much_of_the_run_begin_anew() -> None:
+def test_behaviors_that_hold_much_of_the_run_begin_anew():
     """They were copied with all that they referred to, as far as what no run can copy."""
     crash = {"at": "2 h", "power": "astro", "state": "crash"}
     content = {"extends": "bundled:paper", "simulation": {"duration": "3 h"}, "script": [crash]}
@@ -353,7 +349,7 @@ def test_behaviors_that_hold_much_of_the_run_begin_anew() -> None:
     assert [7200, 7260] == [step for step, *_ in events(run(content), *POWER)]
 
 
-def test_a_changed_behavior_keeps_its_keys_when_it_begins_anew() -> None:
+def test_a_changed_behavior_keeps_its_keys_when_it_begins_anew():
     keys = {"rooms": ["kitchen"]}
     script = [
         {"at": "07:02", "configure": "astro", "behavior": "patrol", "keys": keys},
@@ -379,9 +375,7 @@ def reminded(script: list[dict[str, Any]], **pill: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("event", ["asks", "accepted"])
-def test_power_that_is_lost_in_an_interaction_breaks_it_off_and_it_is_made_again(
-    event: str,
-) -> None:
+def test_power_that_is_lost_in_an_interaction_breaks_it_off_and_it_is_made_again(event):
     script = [{"on": [event, "astro"], "delay": "1 s", "power": "astro", "duration": "20 min"}]
     stored = same_for_every_span(reminded(script))
     kinds = [kind for _, kind, _ in events(stored, "asks", "accepted", "broken_off", "power_off", "power_on", "delivered")]  # fmt: skip
@@ -393,7 +387,7 @@ def test_power_that_is_lost_in_an_interaction_breaks_it_off_and_it_is_made_again
 
 
 @pytest.mark.parametrize("period", ["1 h", "10 min 10 s"])
-def test_what_was_broken_off_counts_once_when_it_is_carried_out(period: str) -> None:
+def test_what_was_broken_off_counts_once_when_it_is_carried_out(period):
     """The second period ends between the question and the moment when power is lost."""
     script = [{"on": ["accepted", "astro"], "delay": "1 s", "power": "astro", "duration": "20 min"}]
     content = reminded(script)
@@ -405,7 +399,7 @@ def test_what_was_broken_off_counts_once_when_it_is_carried_out(period: str) -> 
     assert 4.0 == numbers["value"]
 
 
-def test_what_was_accepted_too_late_is_not_made_again() -> None:
+def test_what_was_accepted_too_late_is_not_made_again():
     script = [{"on": ["accepted", "astro"], "delay": "1 s", "power": "astro", "duration": "1 h"}]
     stored = run(reminded(script, within="20 min"))
 
@@ -413,7 +407,7 @@ def test_what_was_accepted_too_late_is_not_made_again() -> None:
     assert 1 == len(events(stored, "asks"))
 
 
-def test_a_person_trusts_less_after_a_robot_went_off_in_the_middle() -> None:
+def test_a_person_trusts_less_after_a_robot_went_off_in_the_middle():
     script = [{"on": ["asks", "astro"], "delay": "1 s", "power": "astro", "duration": "20 min"}]
     simulation = fleet2d.Simulation(reminded(script))
     simulation.run_until(event="broken_off", entity="astro", timeout="1 h")
@@ -424,7 +418,7 @@ def test_a_person_trusts_less_after_a_robot_went_off_in_the_middle() -> None:
     assert 0.525 * 0.97 == pytest.approx(conversations.attitudes[0, 1].trust)
 
 
-def test_a_robot_that_is_off_does_not_hear_calls() -> None:
+def test_a_robot_that_is_off_does_not_hear_calls():
     come = {"at": "07:06", "call": "astro", "to": "kitchen"}
     content = home({"at": "07:05", "power": "astro", "duration": "5 min"}, come)
     content["robots"]["astro"]["behaviors"] = [{"type": "come"}, PATROL]
@@ -435,7 +429,7 @@ def test_a_robot_that_is_off_does_not_hear_calls() -> None:
 # Doors, and runs
 
 
-def test_a_battery_that_ends_in_a_doorway_hangs_nothing() -> None:
+def test_a_battery_that_ends_in_a_doorway_hangs_nothing():
     """The door waits for the robot to be carried off, people go through, and it goes on afterwards."""
     script = [
         {"at": "07:02", "put": "astro", "to": [5.05, 3.1]},
@@ -456,7 +450,7 @@ def test_a_battery_that_ends_in_a_doorway_hangs_nothing() -> None:
     assert events(stored, "power_on")
 
 
-def test_a_stored_run_is_reproduced_and_an_interrupted_one_resumed(tmp_path: Any) -> None:
+def test_a_stored_run_is_reproduced_and_an_interrupted_one_resumed(tmp_path):
     power = {"crashes": {"per_day": 30, "lasts": "2 min"}, "persists": ["ltp"]}
     content = home(duration="6 h", astro={"power": power, "battery": BATTERY}, algorithms=LEARNERS)
     stored = fleet2d.run(content, out=tmp_path / "run")
@@ -484,7 +478,7 @@ class Watched(Algorithm):
         return {"watched": history.evidence.watched.sum(axis=1)}
 
 
-def test_nothing_counts_as_watched_while_it_is_off() -> None:
+def test_nothing_counts_as_watched_while_it_is_off():
     algorithms = {"watched": {"type": "tests.engine.test_power:Watched", "period": "10 min"}}
     content = home({"at": "07:05", "power": "astro", "duration": "20 min"}, algorithms=algorithms)
     watched = table(same_for_every_span(content, 1), "watched")["watched"]
@@ -495,7 +489,7 @@ def test_nothing_counts_as_watched_while_it_is_off() -> None:
     assert (watched[25:] > 0).all()
 
 
-def test_a_test_can_expect_and_ask_why_it_is_off() -> None:
+def test_a_test_can_expect_and_ask_why_it_is_off():
     script = [
         {"at": "07:05", "power": "astro", "state": "update", "duration": "10 min"},
         {"at": "07:25", "power": "astro", "duration": "10 min"},
@@ -521,7 +515,7 @@ def test_a_test_can_expect_and_ask_why_it_is_off() -> None:
     assert {"still": True, "updates": True, "off": True, "wrong": False} == holds
 
 
-def test_a_robot_that_is_driven_from_outside_follows_no_plan_while_it_is_off() -> None:
+def test_a_robot_that_is_driven_from_outside_follows_no_plan_while_it_is_off():
     simulation = fleet2d.Simulation(home(duration="20 min"))
     simulation.do({"drive": "astro"})
     simulation.do({"at": "07:05", "power": "astro", "duration": "5 min"})
@@ -540,7 +534,7 @@ def test_a_robot_that_is_driven_from_outside_follows_no_plan_while_it_is_off() -
 
 
 @pytest.mark.parametrize("at", ["2026-01-05T07:10", ["10 min"]])
-def test_a_camera_fails_for_a_while(at: Any) -> None:
+def test_a_camera_fails_for_a_while(at):
     fails = {"at": at, "lasts": "10 min"}
     cameras = {"front": {**CAMERA, "fails": fails}, "back": {**CAMERA, "heading_deg": 180}}
     content = home(astro={"camera": None, "cameras": cameras})
@@ -554,7 +548,7 @@ def test_a_camera_fails_for_a_while(at: Any) -> None:
 
 
 @pytest.mark.parametrize("says", ["silent", "off", "on"])
-def test_a_sensor_fails_at_random(says: str) -> None:
+def test_a_sensor_fails_at_random(says):
     fails = {"per_day": 40, "lasts": "10 min", "says": says}
     sensor = {"type": "motion_sensor", "at": [6.5, 3.9], "heading_deg": -90, "range": "5 m"}
     content = home(duration="6 h", objects={"motion": {**sensor, "fails": fails}})
@@ -591,7 +585,7 @@ def test_a_sensor_fails_at_random(says: str) -> None:
         ),
     ],
 )
-def test_wrong_settings_are_refused(changes: dict[str, Any], words: str) -> None:
+def test_wrong_settings_are_refused(changes, words):
     script = changes.pop("script", [])
     with pytest.raises(ScenarioError, match=words):
         fleet2d.Simulation(home(*script, **changes))
@@ -602,7 +596,7 @@ def test_wrong_settings_are_refused(changes: dict[str, Any], words: str) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(40), 8))
-def test_robots_that_go_off_and_on_at_any_time_have_the_same_run_for_every_span(seed: int) -> None:
+def test_robots_that_go_off_and_on_at_any_time_have_the_same_run_for_every_span(seed):
     chance = random.Random(seed)
     content = everything("1 h")
     for robot in content["robots"].values():

@@ -24,9 +24,7 @@ def small(**artifacts: Any) -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("span", some([1, None, 13], 3))
-def test_tables_do_not_depend_on_when_rows_are_handed_over(
-    monkeypatch: pytest.MonkeyPatch, span: int | None
-) -> None:
+def test_tables_do_not_depend_on_when_rows_are_handed_over(monkeypatch, span):
     content = everything("30 min", artifacts=DECISIONS)
     expected = digests(run(content))
     monkeypatch.setattr(recorder, "MAX_ROWS", 0)
@@ -35,9 +33,7 @@ def test_tables_do_not_depend_on_when_rows_are_handed_over(
 
 
 @pytest.mark.slow
-def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_early(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_early(monkeypatch):
     """The last rows of several bodies fall on one step: where they break off."""
     for seconds in (601, 613, 640):
         content = everything(f"{seconds} s")
@@ -50,7 +46,7 @@ def test_every_step_of_the_end_is_the_same_when_rows_are_handed_over_late_or_ear
 @pytest.mark.parametrize(
     "name", ["trajectories", "key_frames", "observations", "events", "decisions"]
 )
-def test_rows_are_in_order_of_step_and_entity(name: str) -> None:
+def test_rows_are_in_order_of_step_and_entity(name):
     stored = run(everything("1 h", artifacts=DECISIONS))
     columns = table(stored, name)
     bodies = [*stored.manifest["entities"]["users"], *stored.manifest["entities"]["robots"]]
@@ -65,7 +61,7 @@ def test_rows_are_in_order_of_step_and_entity(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["trajectories", "key_frames", "observations", "events"])
-def test_a_table_that_is_off_is_not_there_and_changes_no_other(name: str) -> None:
+def test_a_table_that_is_off_is_not_there_and_changes_no_other(name):
     everything_on = digests(run(small()))
     off = digests(run(small(**{name: "off" if name == "trajectories" else False})))
     assert everything_on.keys() - {name} == off.keys()
@@ -74,7 +70,7 @@ def test_a_table_that_is_off_is_not_there_and_changes_no_other(name: str) -> Non
     }
 
 
-def test_decisions_change_no_other_table_and_name_the_behavior_that_decided() -> None:
+def test_decisions_change_no_other_table_and_name_the_behavior_that_decided():
     without, stored = run(small()), run(small(decisions=True))
     assert without.digest != stored.digest
     assert without.manifest["tables"].items() <= stored.manifest["tables"].items()
@@ -84,7 +80,7 @@ def test_decisions_change_no_other_table_and_name_the_behavior_that_decided() ->
     assert begun.tolist() == planned.astype(int).tolist()
 
 
-def test_seen_and_lost_take_turns() -> None:
+def test_seen_and_lost_take_turns():
     stored = run(everything("2 h"))
     count = 0
     for robot in ("astro", "bolt", "curio", "drift"):
@@ -96,7 +92,7 @@ def test_seen_and_lost_take_turns() -> None:
     assert count > 100
 
 
-def test_users_are_seen_at_their_first_detection_and_lost_when_the_patience_is_over() -> None:
+def test_users_are_seen_at_their_first_detection_and_lost_when_the_patience_is_over():
     stored = run(everything("2 h"))
     for robot, patience in (("astro", 20), ("bolt", 4)):  # 3.5 s are 4 steps
         for user in ("ana", "ben"):
@@ -113,7 +109,7 @@ def test_users_are_seen_at_their_first_detection_and_lost_when_the_patience_is_o
             assert expected == found
 
 
-def test_an_observation_is_where_the_user_was_at_that_step_in_that_room() -> None:
+def test_an_observation_is_where_the_user_was_at_that_step_in_that_room():
     stored = run(everything("1 h"), "artifacts.trajectories=every step")
     observations = table(stored, "observations")
     for user in ("ana", "ben"):
@@ -125,7 +121,7 @@ def test_an_observation_is_where_the_user_was_at_that_step_in_that_room() -> Non
             assert truth[column][steps].tolist() == observations[column][mine].tolist()
 
 
-def test_nobody_who_is_away_is_observed() -> None:
+def test_nobody_who_is_away_is_observed():
     stored = run(everything("2 h"), "artifacts.trajectories=every step")
     truth = table(stored, "trajectories", entity="ana")
     steps = table(stored, "observations", user="ana")["step"]
@@ -133,7 +129,7 @@ def test_nobody_who_is_away_is_observed() -> None:
     assert not truth["away"][steps].any()
 
 
-def test_the_record_of_a_per_step_algorithm_is_in_the_order_of_steps() -> None:
+def test_the_record_of_a_per_step_algorithm_is_in_the_order_of_steps():
     steps = table(run(every_step("10 min")), "tick")["step"].tolist()
     assert steps == sorted(set(steps))
     assert len(steps) > 1

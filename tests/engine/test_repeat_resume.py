@@ -46,7 +46,7 @@ def undisturbed(duration: str = "1 h") -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("minutes", some([0, 1, 9, 10, 11, 37, 59, 60], 3))
-def test_a_run_that_was_cut_off_goes_on_from_its_checkpoint(tmp_path: Path, minutes: int) -> None:
+def test_a_run_that_was_cut_off_goes_on_from_its_checkpoint(tmp_path, minutes):
     simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
     simulation.run_until(60 * minutes)
     directory = cut_off(simulation)
@@ -57,7 +57,7 @@ def test_a_run_that_was_cut_off_goes_on_from_its_checkpoint(tmp_path: Path, minu
     assert [] == verify_run(directory).foreign
 
 
-def test_a_run_may_be_cut_off_many_times(tmp_path: Path) -> None:
+def test_a_run_may_be_cut_off_many_times(tmp_path):
     simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
     for minute in (12, 25, 31, 44, 58):
         simulation.run_until(60 * minute)
@@ -70,7 +70,7 @@ def test_a_run_may_be_cut_off_many_times(tmp_path: Path) -> None:
     assert [600, 1200, 1800, 2400, 3000] == fleet2d.open_run(directory).manifest["resumed"]
 
 
-def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path):
     simulation = fleet2d.Simulation(content(checkpoint="auto"), out=tmp_path / "run")
     simulation.advance(1234)
     stored = simulation.finish()
@@ -82,14 +82,14 @@ def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     assert [1234] == done.manifest["resumed"]
 
 
-def test_without_a_checkpoint_a_run_begins_anew(tmp_path: Path) -> None:
+def test_without_a_checkpoint_a_run_begins_anew(tmp_path):
     simulation = fleet2d.Simulation(content(checkpoint="off"), out=tmp_path / "run")
     simulation.run_until(2000)
     assert undisturbed() == digests(fleet2d.resume(cut_off(simulation)))
 
 
 @pytest.mark.parametrize("damage", ["checkpoint", "journal", "version"])
-def test_with_a_damaged_checkpoint_a_run_begins_anew(tmp_path: Path, damage: str) -> None:
+def test_with_a_damaged_checkpoint_a_run_begins_anew(tmp_path, damage):
     simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
     simulation.run_until(2000)
     folder = cut_off(simulation) / FOLDER
@@ -102,7 +102,7 @@ def test_with_a_damaged_checkpoint_a_run_begins_anew(tmp_path: Path, damage: str
     assert undisturbed() == digests(fleet2d.resume(tmp_path / "run"))
 
 
-def test_what_was_done_to_a_run_is_done_again(tmp_path: Path) -> None:
+def test_what_was_done_to_a_run_is_done_again(tmp_path):
     def steered(**more: Any) -> fleet2d.Simulation:
         simulation = fleet2d.Simulation(content(), **more)
         simulation.run_until(700)
@@ -120,7 +120,7 @@ def test_what_was_done_to_a_run_is_done_again(tmp_path: Path) -> None:
     assert expected == digests(fleet2d.resume(cut_off(simulation)))
 
 
-def test_what_was_only_scheduled_is_done_after_a_new_beginning(tmp_path: Path) -> None:
+def test_what_was_only_scheduled_is_done_after_a_new_beginning(tmp_path):
     """The manifest of an interrupted run had lost what was to be done at its next step."""
     text = "simulation.duration=10 min"
     twin = fleet2d.Simulation(text, seed=4)
@@ -133,7 +133,7 @@ def test_what_was_only_scheduled_is_done_after_a_new_beginning(tmp_path: Path) -
     assert twin.run().digest == fleet2d.resume(tmp_path / "run").digest
 
 
-def test_what_can_not_be_gone_on_with_says_why(tmp_path: Path) -> None:
+def test_what_can_not_be_gone_on_with_says_why(tmp_path):
     fleet2d.run(scenario("1 min"), out=tmp_path / "whole")
     with pytest.raises(RunDirectoryError, match="complete run: there is nothing"):
         fleet2d.resume(tmp_path / "whole")
@@ -148,7 +148,7 @@ def test_what_can_not_be_gone_on_with_says_why(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name", ["run.lock", "manifest.json.partial", "unfinished", "unfinished/checkpoint.partial"]
 )
-def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path: Path, name: str) -> None:
+def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path, name):
     """A run directory from elsewhere led to another file, which the lock or the manifest replaced."""
     simulation = fleet2d.Simulation(scenario("1 min"), out=tmp_path / "run")
     simulation.advance(30)
@@ -183,9 +183,7 @@ def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path: Path, name: str) 
         ("asks_us", "soon", "plan: asks_us"),
     ],
 )
-def test_an_edited_plan_of_a_driven_robot_is_refused(
-    tmp_path: Path, key: str, value: Any, words: str
-) -> None:
+def test_an_edited_plan_of_a_driven_robot_is_refused(tmp_path, key, value, words):
     """A manifest holds the plans of controllers as numbers; edited ones ended in tracebacks."""
     simulation = fleet2d.Simulation(
         "bundled:paper", "simulation.duration=10 min", seed=4, out=tmp_path / "run"
@@ -203,7 +201,7 @@ def test_an_edited_plan_of_a_driven_robot_is_refused(
         fleet2d.resume(tmp_path / "run")
 
 
-def test_an_input_that_changed_is_not_gone_on_with(tmp_path: Path) -> None:
+def test_an_input_that_changed_is_not_gone_on_with(tmp_path):
     found = content()
     plan = Path(shutil.copy(found["floorplan"]["path"], tmp_path / "plan.json"))
     found["floorplan"]["path"] = str(plan)
@@ -225,7 +223,7 @@ class KeepsALock(Algorithm):
         """Do nothing."""
 
 
-def test_a_component_that_can_not_be_kept_is_named_and_the_run_begins_anew(tmp_path: Path) -> None:
+def test_a_component_that_can_not_be_kept_is_named_and_the_run_begins_anew(tmp_path):
     own = {"algorithms": {"mine": {"type": f"{__name__}:KeepsALock"}}}
     found = scenario("1 h", users={"ana": {"type": "meander"}}, artifacts=CHECKPOINTED, **own)
     simulation = fleet2d.Simulation(found, out=tmp_path / "run")
@@ -240,14 +238,14 @@ def test_a_component_that_can_not_be_kept_is_named_and_the_run_begins_anew(tmp_p
 
 
 @pytest.fixture(scope="module")
-def forks() -> Any:
+def forks():
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["fleet2d.engine.simulation", "fleet2d.artifacts.arrow"])
     return context
 
 
 @pytest.mark.slow
-def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, forks: Any) -> None:
+def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path, forks):
     found, rng = content("2 h"), random.Random(14)
 
     def begin(out: Path, *, again: bool = False) -> Any:
@@ -291,7 +289,7 @@ def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path: Path, for
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", some([signal.SIGTERM, signal.SIGINT], 2))
-def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path: Path, number: int) -> None:
+def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path, number):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = ["-m", "fleet2d.cli", "run", "simulation.duration=20000 d", "--seed", "4"]
     run = subprocess.Popen(
@@ -434,7 +432,7 @@ def run_with_fault(out: Path, fails_at: int, *, dies: bool, drop: bool = False) 
 
 
 @pytest.fixture(scope="module")
-def operations(tmp_path_factory: pytest.TempPathFactory) -> int:
+def operations(tmp_path_factory):
     return run_with_fault(tmp_path_factory.mktemp("count") / "run", 10**9, dies=False)
 
 
@@ -445,8 +443,8 @@ def operations(tmp_path_factory: pytest.TempPathFactory) -> int:
     ids=["fails", "dies", "drops"],
 )
 def test_after_a_fault_at_any_operation_a_run_is_gone_on_with(
-    tmp_path: Path, operations: int, first: int, dies: bool, drop: bool
-) -> None:
+    tmp_path, operations, first, dies, drop
+):
     expected, resumed = undisturbed_short(), 0
     assert operations > 40
     tried = range(1, operations + 1) if THOROUGH else range(first, operations + 1, 6)
@@ -467,7 +465,7 @@ def test_after_a_fault_at_any_operation_a_run_is_gone_on_with(
     assert resumed > len(tried) // 2
 
 
-def test_a_fault_while_resuming_loses_nothing(tmp_path: Path) -> None:
+def test_a_fault_while_resuming_loses_nothing(tmp_path):
     simulation = fleet2d.Simulation(short(), out=tmp_path / "first")
     simulation.run_until(700)
     first = cut_off(simulation)
@@ -493,7 +491,7 @@ def test_a_fault_while_resuming_loses_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_resume_on_the_command_line(tmp_path: Path) -> None:
+def test_resume_on_the_command_line(tmp_path):
     changes = ("simulation.duration=2 d", "artifacts.checkpoint=6 h")
     simulation = fleet2d.Simulation("bundled:paper", *changes, seed=4, out=tmp_path / "run")
     simulation.run_until(100_000)

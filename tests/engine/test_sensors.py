@@ -18,7 +18,7 @@ from fleet2d.interventions import Replan
 
 
 @pytest.fixture
-def plan(tmp_path: Any) -> str:
+def plan(tmp_path):
     content = flat()
     content["objects"] += [
         {
@@ -98,14 +98,14 @@ def household(plan: str) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_readings_are_the_same_for_every_span(plan: str) -> None:
+def test_readings_are_the_same_for_every_span(plan):
     whole = run(household(plan))
     assert {"hall", "contact", "plug"} <= set(table(whole, "sensors")["sensor"])
     for span in (1, 7, 100):
         assert digests(whole) == digests(run(household(plan), max_span=span))
 
 
-def test_contact_sensor_follows_the_door(plan: str) -> None:
+def test_contact_sensor_follows_the_door(plan):
     stored = run(household(plan))
     events = table(stored, "events")
     doors = [
@@ -119,7 +119,7 @@ def test_contact_sensor_follows_the_door(plan: str) -> None:
     assert len(doors) >= 4
 
 
-def test_own_sensor_of_a_door_follows_it(plan: str) -> None:
+def test_own_sensor_of_a_door_follows_it(plan):
     content = household(plan)
     content["objects"]["latch"] = {"type": f"{__name__}:Latch", "of": "door"}
     stored = run(content)
@@ -128,7 +128,7 @@ def test_own_sensor_of_a_door_follows_it(plan: str) -> None:
     assert [(0, "SHUT"), *changes] == readings(stored, "latch")
 
 
-def test_plug_is_on_while_somebody_stays_at_the_stove_and_a_little_after(plan: str) -> None:
+def test_plug_is_on_while_somebody_stays_at_the_stove_and_a_little_after(plan):
     stored = run(household(plan))
     (on, began), (off, ended) = readings(stored, "plug")
     where = table(stored, "trajectories", entity="ana")
@@ -138,7 +138,7 @@ def test_plug_is_on_while_somebody_stays_at_the_stove_and_a_little_after(plan: s
     assert there[-1] + 25 < off <= there[-1] + 32
 
 
-def test_motion_sensor_notices_who_walks_in_its_view_and_nobody_who_stands(plan: str) -> None:
+def test_motion_sensor_notices_who_walks_in_its_view_and_nobody_who_stands(plan):
     stored = run(household(plan))
     where = table(stored, "trajectories", entity="ana")
     moved = np.flatnonzero((np.diff(where["x"]) != 0) | (np.diff(where["y"]) != 0)) + 1
@@ -151,7 +151,7 @@ def test_motion_sensor_notices_who_walks_in_its_view_and_nobody_who_stands(plan:
     assert sum(b - a for a, b in spans) < 150
 
 
-def test_motion_sensor_does_not_see_past_a_shut_door(plan: str) -> None:
+def test_motion_sensor_does_not_see_past_a_shut_door(plan):
     content = home(
         plan,
         "5 min",
@@ -165,7 +165,7 @@ def test_motion_sensor_does_not_see_past_a_shut_door(plan: str) -> None:
     assert readings(run(content, "objects.door.open=true"), "pir")
 
 
-def test_motion_sensor_sees_only_what_it_faces(plan: str) -> None:
+def test_motion_sensor_sees_only_what_it_faces(plan):
     def said(heading: float) -> list[tuple[int, str]]:
         return readings(
             run(
@@ -189,7 +189,7 @@ def test_motion_sensor_sees_only_what_it_faces(plan: str) -> None:
     assert [] == said(-90)
 
 
-def test_bed_is_occupied_while_somebody_lies_in_it(plan: str) -> None:
+def test_bed_is_occupied_while_somebody_lies_in_it(plan):
     from datetime import timedelta
 
     simulation = fleet2d.Simulation(
@@ -218,7 +218,7 @@ def test_bed_is_occupied_while_somebody_lies_in_it(plan: str) -> None:
     assert 120 <= off - on <= 126
 
 
-def test_readings_name_the_activity(plan: str) -> None:
+def test_readings_name_the_activity(plan):
     stored = run(household(plan))
     rows = table(stored, "sensors", sensor="plug")
     assert ["Cook", "Relax"] == rows["activity"].tolist() or ["Cook", "Cook"] == (
@@ -226,7 +226,7 @@ def test_readings_name_the_activity(plan: str) -> None:
     )
 
 
-def test_algorithms_are_handed_the_readings(plan: str) -> None:
+def test_algorithms_are_handed_the_readings(plan):
     stored = run(household(plan))
     said = table(stored, "collector")["said"]
     assert len(table(stored, "sensors")["step"]) == int(np.sum(said))
@@ -241,17 +241,13 @@ def test_algorithms_are_handed_the_readings(plan: str) -> None:
         ({"type": "motion_sensor", "at": [50, 50]}, "outside the home"),
     ],
 )
-def test_sensor_of_what_is_not_there_is_refused(
-    plan: str, sensor: dict[str, Any], message: str
-) -> None:
+def test_sensor_of_what_is_not_there_is_refused(plan, sensor, message):
     with pytest.raises(InputError, match=message):
         fleet2d.Simulation(home(plan, users={"ana": stands(6, 1.4)}, objects={"s": sensor}))
 
 
 @given(st.sets(st.integers(0, 39)), st.integers(0, 6), st.lists(st.integers(1, 15), min_size=40))
-def test_sensor_goes_off_when_it_was_quiet_for_its_hold(
-    excited: set[int], hold: int, spans: list[int]
-) -> None:
+def test_sensor_goes_off_when_it_was_quiet_for_its_hold(excited, hold, spans):
     state, readings, begin = SensorState(hold), [], 0
     for length in spans:
         end = min(40, begin + length)

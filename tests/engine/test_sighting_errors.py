@@ -43,7 +43,7 @@ def reactions(stored: Run) -> list[Any]:
 
 
 @pytest.mark.slow
-def test_a_run_is_the_same_for_every_max_span() -> None:
+def test_a_run_is_the_same_for_every_max_span():
     content = unsure(blinking={"type": "Blinking"})
     content["simulation"]["duration"] = "5 min"
     content["robots"]["astro"]["localization"] = {"drift": "3 cm", "drift_deg": 1}
@@ -51,7 +51,7 @@ def test_a_run_is_the_same_for_every_max_span() -> None:
     assert [first] * 3 == others
 
 
-def test_a_person_who_is_missed_is_as_one_who_is_suppressed() -> None:
+def test_a_person_who_is_missed_is_as_one_who_is_suppressed():
     """The look itself knows suppressed people: rows, events, reactions and counts must be equal."""
     by_script = unsure()
     by_script["script"] = [
@@ -69,7 +69,7 @@ def test_a_person_who_is_missed_is_as_one_who_is_suppressed() -> None:
 
 
 @pytest.mark.parametrize("other", ["ana", "unknown"])
-def test_a_person_who_is_mistaken_is_as_one_whom_a_script_lets_be(other: str) -> None:
+def test_a_person_who_is_mistaken_is_as_one_whom_a_script_lets_be(other):
     by_script = unsure()
     by_script["script"] = [
         {"at": "5 min", "mistake": robot, "user": "ben", "taken_for": other, "duration": "10 min"}
@@ -87,7 +87,7 @@ def test_a_person_who_is_mistaken_is_as_one_whom_a_script_lets_be(other: str) ->
     assert reactions(scripted) == reactions(erring)
 
 
-def test_events_are_those_of_the_look(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_events_are_those_of_the_look(monkeypatch):
     """Noted anew from sightings that are as they were, events are the same."""
     content = unsure(nothing={"type": "Missed", "person": "ana", "end": 0})
     expected = digests(run(content))
@@ -105,7 +105,7 @@ def test_events_are_those_of_the_look(monkeypatch: pytest.MonkeyPatch) -> None:
     assert expected == digests(run(unsure()))
 
 
-def test_observations_have_the_truth_beside_what_is_perceived() -> None:
+def test_observations_have_the_truth_beside_what_is_perceived():
     content = everything("1 h")
     content["robots"] = {"curio": content["robots"]["curio"]}
     perfect = table(run(content), "observations")
@@ -119,7 +119,7 @@ def test_observations_have_the_truth_beside_what_is_perceived() -> None:
     assert (np.hypot(rows["x"] - rows["true_x"], rows["y"] - rows["true_y"]) > 0.01).mean() > 0.9
 
 
-def test_each_camera_may_have_its_own_errors_and_each_error_its_own_draws() -> None:
+def test_each_camera_may_have_its_own_errors_and_each_error_its_own_draws():
     content = unsure()
     cameras = content["robots"]["astro"]["cameras"]
     moved = {
@@ -135,7 +135,7 @@ def test_each_camera_may_have_its_own_errors_and_each_error_its_own_draws() -> N
     np.testing.assert_array_equal(rows["x"], alone["x"])
 
 
-def test_errors_act_in_the_order_of_their_names() -> None:
+def test_errors_act_in_the_order_of_their_names():
     """A stored scenario has its keys in the order of the alphabet: the file's order can't count."""
     moved = {"type": "miscalibration", "offset": "1 m"}
     scaled = {"type": "miscalibration", "scale": 2.0}
@@ -165,7 +165,7 @@ def test_errors_act_in_the_order_of_their_names() -> None:
         ("anything else", "KeyError: 'kitchen'"),
     ],
 )
-def test_a_wrong_error_is_named_with_its_step(returns: str, message: str) -> None:
+def test_a_wrong_error_is_named_with_its_step(returns, message):
     content = unsure(odd={"type": "Wrong", "returns": returns})
     with pytest.raises(fleet2d.ComponentError) as caught:
         run(content)
@@ -176,7 +176,7 @@ def test_a_wrong_error_is_named_with_its_step(returns: str, message: str) -> Non
 
 
 @pytest.mark.slow
-def test_a_copied_a_saved_and_a_repeated_run_are_the_same(tmp_path: Path) -> None:
+def test_a_copied_a_saved_and_a_repeated_run_are_the_same(tmp_path):
     content = unsure(blinking={"type": "Blinking"})
     whole = run(content, out=tmp_path / "run")
     assert fleet2d.reproduce(tmp_path / "run", trust=True).same
@@ -190,7 +190,7 @@ def test_a_copied_a_saved_and_a_repeated_run_are_the_same(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("robot", ["astro", "curio"])
-def test_a_fault_brings_errors_to_the_looks_within_it(robot: str) -> None:
+def test_a_fault_brings_errors_to_the_looks_within_it(robot):
     """What a camera with latency saw before becomes known within the fault, as it was seen."""
     content = unsure()
     content["robots"]["astro"]["perception"] = None
@@ -205,7 +205,7 @@ def test_a_fault_brings_errors_to_the_looks_within_it(robot: str) -> None:
     assert not is_off[~is_within].any()
 
 
-def test_scenarios_without_errors_have_nothing_after_the_look() -> None:
+def test_scenarios_without_errors_have_nothing_after_the_look():
     state = fleet2d.Simulation(looks())._state
     assert all(cameras.sighting_errors is None for cameras in state.cameras)
     state = fleet2d.Simulation(unsure(a={"type": "Blinking"}))._state

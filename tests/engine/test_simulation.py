@@ -21,7 +21,7 @@ def small(duration: str = "10 min", **sections: Any) -> dict[str, Any]:
     )
 
 
-def test_the_state_is_that_of_the_next_step() -> None:
+def test_the_state_is_that_of_the_next_step():
     content = small("3 min")
     rows = table(run(content, "artifacts.trajectories=every step"), "trajectories", entity="ana")
     simulation = fleet2d.Simulation(content)
@@ -36,7 +36,7 @@ def test_the_state_is_that_of_the_next_step() -> None:
     assert simulation.done
 
 
-def test_advancing_beyond_the_end_stops_at_the_end() -> None:
+def test_advancing_beyond_the_end_stops_at_the_end():
     simulation = fleet2d.Simulation(small("1 min"))
     simulation.advance(1000)
     assert (60, True) == (simulation.step, simulation.done)
@@ -47,7 +47,7 @@ def test_advancing_beyond_the_end_stops_at_the_end() -> None:
     assert "complete" == simulation.finish().status
 
 
-def test_time_only_goes_forward() -> None:
+def test_time_only_goes_forward():
     simulation = fleet2d.Simulation(small())
     simulation.advance(100)
     for when in (50, timedelta(seconds=3), datetime(2026, 1, 5, 6)):
@@ -60,7 +60,7 @@ def test_time_only_goes_forward() -> None:
     assert 100 == simulation.step
 
 
-def test_a_run_finished_early_is_interrupted_and_whole_until_then() -> None:
+def test_a_run_finished_early_is_interrupted_and_whole_until_then():
     simulation = fleet2d.Simulation(small())
     simulation.advance(150)
     stored = simulation.finish()
@@ -71,7 +71,7 @@ def test_a_run_finished_early_is_interrupted_and_whole_until_then() -> None:
     assert [] == stored.verify()
 
 
-def test_a_finished_run_can_not_go_on() -> None:
+def test_a_finished_run_can_not_go_on():
     simulation = fleet2d.Simulation(small())
     simulation.advance(1)
     stored = simulation.finish()
@@ -81,14 +81,14 @@ def test_a_finished_run_can_not_go_on() -> None:
     assert stored is simulation.finish()
 
 
-def test_a_scenario_run_twice_runs_the_same_twice() -> None:
+def test_a_scenario_run_twice_runs_the_same_twice():
     content = small(algorithms={"keeper": {"type": f"{OWN}:Keeper", "period": "1 min"}})
     loaded = fleet2d.load_scenario(content)
     first, second = fleet2d.run(loaded), fleet2d.run(loaded)
     assert first.digest == second.digest
 
 
-def test_what_an_algorithm_put_out_does_not_change_with_its_own_arrays() -> None:
+def test_what_an_algorithm_put_out_does_not_change_with_its_own_arrays():
     both = {
         "keeper": {"type": f"{OWN}:Keeper", "period": "1 min"},
         "peek": {"type": f"{OWN}:Peek", "period": "1 min", "of": "keeper"},
@@ -101,19 +101,19 @@ def test_what_an_algorithm_put_out_does_not_change_with_its_own_arrays() -> None
     assert [-1, 1, 2] == result[0][:3]
 
 
-def test_nobody_writes_into_the_outputs() -> None:
+def test_nobody_writes_into_the_outputs():
     content = {**small(), "users": {"ben": {"type": f"{OWN}:Scribbler"}}}
     with pytest.raises(ComponentError, match="TypeError"):
         run(content)
 
 
-def test_nothing_seen_yet_does_not_fix_the_columns() -> None:
+def test_nothing_seen_yet_does_not_fix_the_columns():
     content = small(algorithms={"late": {"type": f"{OWN}:Late", "period": "1 min"}})
     table = run(content).tables["late"]
     assert {"ana"} == set(table["user"].to_pylist())
 
 
-def test_a_failed_run_says_why() -> None:
+def test_a_failed_run_says_why():
     content = small(algorithms={"bad": {"type": f"{OWN}:Bad", "period": "1 min"}})
     simulation = fleet2d.Simulation(content)
     with pytest.raises(ComponentError):
@@ -123,7 +123,7 @@ def test_a_failed_run_says_why() -> None:
     assert any("algorithms.bad" in note and "own_components.py" in note for note in stored.notes)
 
 
-def test_a_span_that_broke_off_is_never_complete() -> None:
+def test_a_span_that_broke_off_is_never_complete():
     content = small(algorithms={"bad": {"type": f"{OWN}:Bad", "period": "1 min"}})
     simulation = fleet2d.Simulation(content)
     with pytest.raises(ComponentError):
@@ -133,7 +133,7 @@ def test_a_span_that_broke_off_is_never_complete() -> None:
     assert "failed" == simulation.finish().status
 
 
-def test_outputs_of_algorithms_can_be_looked_at() -> None:
+def test_outputs_of_algorithms_can_be_looked_at():
     content = small(algorithms={"share": {"type": f"{OWN}:Share", "period": "2 min"}})
     simulation = fleet2d.Simulation(content)
     simulation.advance(119)
@@ -142,7 +142,7 @@ def test_outputs_of_algorithms_can_be_looked_at() -> None:
     assert 1 == pytest.approx(simulation.outputs["share"].share.sum())
 
 
-def test_without_a_seed_one_is_drawn_stored_and_repeats_the_run() -> None:
+def test_without_a_seed_one_is_drawn_stored_and_repeats_the_run():
     content = small("2 min")
     del content["simulation"]["seed"]
     first, second = (run(content) for _ in range(2))
@@ -153,7 +153,7 @@ def test_without_a_seed_one_is_drawn_stored_and_repeats_the_run() -> None:
     assert first.digest == run(content, seed=seed).digest
 
 
-def test_branches_share_the_floor_plan_and_nothing_else() -> None:
+def test_branches_share_the_floor_plan_and_nothing_else():
     simulation = fleet2d.Simulation(everything("20 min"))
     simulation.advance(600)
     branch = copy.deepcopy(simulation)
@@ -164,7 +164,7 @@ def test_branches_share_the_floor_plan_and_nothing_else() -> None:
         assert branch.actors[name].entity is simulation.actors[name].entity
 
 
-def test_a_branch_can_be_changed_without_the_other_noticing() -> None:
+def test_a_branch_can_be_changed_without_the_other_noticing():
     simulation = fleet2d.Simulation(small())
     simulation.advance(200)
     branch = copy.deepcopy(simulation)
@@ -175,23 +175,21 @@ def test_a_branch_can_be_changed_without_the_other_noticing() -> None:
     assert digests(branch.run())["trajectories"] != digests(run(small()))["trajectories"]
 
 
-def test_a_simulation_that_stores_in_a_directory_can_not_be_copied(tmp_path: Path) -> None:
+def test_a_simulation_that_stores_in_a_directory_can_not_be_copied(tmp_path):
     simulation = fleet2d.Simulation(small(), out=tmp_path / "run")
     with pytest.raises(ArtifactError, match="stores in"):
         copy.deepcopy(simulation)
     simulation.finish()
 
 
-def test_a_directory_and_memory_get_the_same_tables(tmp_path: Path) -> None:
+def test_a_directory_and_memory_get_the_same_tables(tmp_path):
     stored = run(everything("20 min"), out=tmp_path / "run")
     assert digests(run(everything("20 min"))) == digests(stored)
     assert [] == stored.verify()
     assert stored.directory == tmp_path / "run"
 
 
-def test_a_directory_that_holds_something_is_refused_before_anything_is_computed(
-    tmp_path: Path,
-) -> None:
+def test_a_directory_that_holds_something_is_refused_before_anything_is_computed(tmp_path):
     (tmp_path / "mine.txt").write_text("precious")
     with pytest.raises(RunDirectoryError, match="not empty"):
         fleet2d.Simulation(small(), out=tmp_path)
@@ -208,13 +206,13 @@ def test_a_directory_that_holds_something_is_refused_before_anything_is_computed
         {"artifacts": {"trajectories": "1.5 s"}},
     ],
 )
-def test_wrong_input_leaves_no_directory(tmp_path: Path, change: dict[str, Any]) -> None:
+def test_wrong_input_leaves_no_directory(tmp_path, change):
     with pytest.raises(InputError):
         fleet2d.Simulation(small() | change, out=tmp_path / "deep" / "run")
     assert [] == list(tmp_path.iterdir())
 
 
-def test_progress_is_told_now_and_then() -> None:
+def test_progress_is_told_now_and_then():
     told: list[int] = []
     content = small("1 h", algorithms={"tick": {"type": f"{OWN}:Tick", "period": "1 s"}})
     fleet2d.Simulation(content).run(lambda simulation: told.append(simulation.step))
@@ -222,7 +220,7 @@ def test_progress_is_told_now_and_then() -> None:
     assert told
 
 
-def test_wall_times_add_up(tmp_path: Path) -> None:
+def test_wall_times_add_up(tmp_path):
     import time
 
     began = time.perf_counter()
@@ -234,7 +232,7 @@ def test_wall_times_add_up(tmp_path: Path) -> None:
     assert sum(wall.values()) <= took
 
 
-def test_users_without_robots_robots_without_users_and_nobody_run() -> None:
+def test_users_without_robots_robots_without_users_and_nobody_run():
     for content in (
         scenario("1 h", users={"ana": {"type": "meander"}}),
         scenario("1 h", robots={"astro": {"type": "patrol"}}),
@@ -246,7 +244,7 @@ def test_users_without_robots_robots_without_users_and_nobody_run() -> None:
         assert [] == stored.verify()
 
 
-def test_the_manifest_tells_what_was_run() -> None:
+def test_the_manifest_tells_what_was_run():
     stored = run(small("90 s", simulation={"step": "500 ms"}))
     manifest = stored.manifest
     assert ("complete", 180, 90.0, 500_000) == (
@@ -262,7 +260,7 @@ def test_the_manifest_tells_what_was_run() -> None:
     assert stored.digest == run(again).digest
 
 
-def test_the_files_of_own_components_are_among_the_inputs() -> None:
+def test_the_files_of_own_components_are_among_the_inputs():
     stored = run(everything("1 min"))
     names = {Path(record["path"]).name for record in stored.manifest["inputs"]}
     assert {"flat.json", "own_components.py"} == names

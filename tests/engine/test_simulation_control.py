@@ -24,7 +24,7 @@ def simulation() -> Simulation:
     return Simulation("bundled:paper", "simulation.duration=2 h", robots=robots)
 
 
-def test_replan_lets_a_branch_go_elsewhere_and_leaves_the_original() -> None:
+def test_replan_lets_a_branch_go_elsewhere_and_leaves_the_original():
     history = simulation()
     history.advance(600)
     future = copy.deepcopy(history)
@@ -35,7 +35,7 @@ def test_replan_lets_a_branch_go_elsewhere_and_leaves_the_original() -> None:
     assert ("kitchen_1", "entryway_1") == tuple(s.state["astro"]["room"] for s in (future, history))
 
 
-def test_replan_is_kept_in_the_manifest() -> None:
+def test_replan_is_kept_in_the_manifest():
     steered = simulation()
     steered.advance(10)
     steered.do(Replan("astro"))
@@ -44,23 +44,23 @@ def test_replan_is_kept_in_the_manifest() -> None:
     assert 2 * [{"do": "replan", "step": 10, "entity": "astro"}] == done
 
 
-def test_replan_of_somebody_unknown_names_who_there_is() -> None:
+def test_replan_of_somebody_unknown_names_who_there_is():
     with pytest.raises(ScenarioError, match="did you mean 'astro'"):
         simulation().do(Replan("asto"))
 
 
-def test_override_in_the_place_of_the_file_changes_the_bundled_scenario() -> None:
+def test_override_in_the_place_of_the_file_changes_the_bundled_scenario():
     assert 7200 == load_scenario("bundled:paper", "simulation.duration=2 h").simulation.steps
 
 
 @pytest.mark.parametrize("xy", [(-3.0, -3.0), (0.0, 0.0), (100.0, 2.0)])
-def test_nearest_free_is_a_place_that_the_body_can_go_to(xy: tuple[float, float]) -> None:
+def test_nearest_free_is_a_place_that_the_body_can_go_to(xy):
     start = simulation()
     now = Situation(start.actors["astro"], 0)
     plan = now.plan().go_to(now.nearest_free(*xy))
     assert plan.time_us > 0
 
 
-def test_nearest_free_of_a_free_place_is_that_place() -> None:
+def test_nearest_free_of_a_free_place_is_that_place():
     now = Situation(simulation().actors["astro"], 0)
     assert now.nearest_free(*now.xy) == now.xy

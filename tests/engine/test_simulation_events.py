@@ -35,7 +35,7 @@ def stored(run: Any) -> list[tuple[int, str, str]]:
 
 
 @pytest.mark.parametrize("content", [DAY, DAY | WITHOUT_LEARNERS], ids=["learns", "only_lives"])
-def test_a_listener_hears_all_that_is_stored(content: dict[str, Any]) -> None:
+def test_a_listener_hears_all_that_is_stored(content):
     simulation = fleet2d.Simulation(content)
     heard: list[tuple[int, str, str]] = []
     simulation.listen(lambda events: heard.extend((e.step, e.entity, str(e.event)) for e in events))
@@ -48,7 +48,7 @@ def test_a_listener_hears_all_that_is_stored(content: dict[str, Any]) -> None:
     assert [step for step, _, _ in heard] == sorted(step for step, _, _ in heard)
 
 
-def test_a_listener_hears_events_in_the_order_of_the_table() -> None:
+def test_a_listener_hears_events_in_the_order_of_the_table():
     simulation = fleet2d.Simulation(DAY)
     heard: list[tuple[int, str, str]] = []
     simulation.listen(
@@ -62,7 +62,7 @@ def test_a_listener_hears_events_in_the_order_of_the_table() -> None:
     assert heard == [(row["step"], row["entity"] or "", row["event"]) for row in table]
 
 
-def test_a_listener_is_called_before_the_next_step() -> None:
+def test_a_listener_is_called_before_the_next_step():
     simulation = fleet2d.Simulation(DAY)
     late: list[int] = []
     simulation.listen(lambda events: late.extend(simulation.step - e.step for e in events))
@@ -72,14 +72,14 @@ def test_a_listener_is_called_before_the_next_step() -> None:
     assert set(late) == {1}
 
 
-def test_listening_does_not_change_the_run() -> None:
+def test_listening_does_not_change_the_run():
     simulation = fleet2d.Simulation(DAY)
     simulation.listen(lambda events: None)
 
     assert simulation.run().digest == fleet2d.run(DAY).digest
 
 
-def test_a_listener_gets_only_its_kinds_and_may_intervene() -> None:
+def test_a_listener_gets_only_its_kinds_and_may_intervene():
     content = DAY | {"robots": {"astro": {"behaviors": [{"type": "come"}, {"type": "patrol"}]}}}
     simulation = fleet2d.Simulation(content, "simulation.start=2026-01-05T07:00")
 
@@ -97,7 +97,7 @@ def test_a_listener_gets_only_its_kinds_and_may_intervene() -> None:
     assert called == [step + 1 for step in readings if step + 1 < 86400]
 
 
-def test_a_copy_has_no_listener() -> None:
+def test_a_copy_has_no_listener():
     simulation = fleet2d.Simulation(DAY)
     heard: list[Any] = []
     simulation.listen(heard.extend)
@@ -109,13 +109,13 @@ def test_a_copy_has_no_listener() -> None:
     assert twin._state.awaited == frozenset()
 
 
-def test_an_unknown_kind_is_refused_with_the_nearest_name() -> None:
+def test_an_unknown_kind_is_refused_with_the_nearest_name():
     with pytest.raises(InputError, match="there is no event 'sensors': did you mean 'sensor'"):
         fleet2d.Simulation(DAY).listen(lambda events: None, ["sensors"])
 
 
 @pytest.mark.parametrize("event", ["sensor", "opened", "activity", "user_seen"])
-def test_running_until_an_event_stops_at_the_step_after_it(event: str) -> None:
+def test_running_until_an_event_stops_at_the_step_after_it(event):
     for content in (DAY, DAY | WITHOUT_LEARNERS):
         first = next(step for step, _, name in stored(fleet2d.run(content)) if name == event)
         simulation = fleet2d.Simulation(content)
@@ -126,7 +126,7 @@ def test_running_until_an_event_stops_at_the_step_after_it(event: str) -> None:
         assert (result.step, simulation.step) == (first, first + 1)
 
 
-def test_running_until_a_sensor_reports_names_its_state() -> None:
+def test_running_until_a_sensor_reports_names_its_state():
     simulation = fleet2d.Simulation(DAY)
 
     event = simulation.run_until(event="sensor", entity="hall_motion")
@@ -136,7 +136,7 @@ def test_running_until_a_sensor_reports_names_its_state() -> None:
     assert simulation.state["hall_motion"]["on"]
 
 
-def test_a_copy_of_a_run_does_not_call_those_who_listen_to_rows() -> None:
+def test_a_copy_of_a_run_does_not_call_those_who_listen_to_rows():
     simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=2 h", seed=4)
     tables: list[str] = []
     simulation.listen_rows(lambda table, row: tables.append(table))

@@ -30,7 +30,7 @@ TIMES = {
 
 
 @pytest.mark.parametrize(("when", "expected"), TIMES.items(), ids=map(str, TIMES))
-def test_every_time_that_scripts_take_is_taken(when: Any, expected: str) -> None:
+def test_every_time_that_scripts_take_is_taken(when, expected):
     simulation = home()
     simulation.run_until(when)
 
@@ -50,7 +50,7 @@ def test_every_time_that_scripts_take_is_taken(when: Any, expected: str) -> None
         ("25:00", "a time of day"),
     ],
 )
-def test_an_end_behind_or_after_the_run_is_an_error(when: Any, words: str) -> None:
+def test_an_end_behind_or_after_the_run_is_an_error(when, words):
     simulation = home()
     simulation.run_until("09:00")
 
@@ -59,7 +59,7 @@ def test_an_end_behind_or_after_the_run_is_an_error(when: Any, words: str) -> No
     assert datetime(2026, 1, 5, 9) == simulation.time
 
 
-def test_it_runs_until_a_function_returns_true() -> None:
+def test_it_runs_until_a_function_returns_true():
     simulation, slow = home("1 h"), home("1 h")
     came = simulation.run_until(
         lambda now: now.state["ana"]["room"] == "bathroom_1", timeout="20 min"
@@ -73,7 +73,7 @@ def test_it_runs_until_a_function_returns_true() -> None:
     assert slow.step + 60 == simulation.step
 
 
-def test_it_runs_until_a_condition_holds_and_stops_at_that_step() -> None:
+def test_it_runs_until_a_condition_holds_and_stops_at_that_step():
     simulation, other = home("2 h"), home("2 h")
     verdict = simulation.run_until(room("ana") == "bathroom")
     other.run_until(lambda now: now.state["ana"]["room"] == "bathroom_1")
@@ -85,7 +85,7 @@ def test_it_runs_until_a_condition_holds_and_stops_at_that_step() -> None:
     assert simulation.run().digest == home("2 h").run().digest
 
 
-def test_it_runs_until_an_expectation_is_decided() -> None:
+def test_it_runs_until_an_expectation_is_decided():
     simulation = home("2 h")
     verdict = simulation.run_until(always(distance("astro", "kitchen") > 0.1), timeout="1 h")
 
@@ -94,7 +94,7 @@ def test_it_runs_until_an_expectation_is_decided() -> None:
     assert verdict.violations[0].first + 1 == simulation.step
 
 
-def test_something_is_expected_while_stepping() -> None:
+def test_something_is_expected_while_stepping():
     simulation = home("1 h")
     simulation.advance(100)
     simulation.expect("never(room(ana) == bathroom)", "dry")

@@ -135,7 +135,7 @@ WAYS: dict[str, Callable[[Simulation], Simulation]] = {
         if THOROUGH or j in (2, i % 3)
     ],
 )
-def test_a_copy_made_at_any_step_goes_on_to_the_same_run(scene: str, way: str) -> None:
+def test_a_copy_made_at_any_step_goes_on_to_the_same_run(scene, way):
     content, draws = SCENES[scene](), random.Random(f"{scene} {way}")
     simulation = Simulation(content)
     steps = sorted(draws.randrange(simulation.clock.steps) for _ in range(2 if THOROUGH else 1))
@@ -149,7 +149,7 @@ def test_a_copy_made_at_any_step_goes_on_to_the_same_run(scene: str, way: str) -
 
 
 @pytest.mark.parametrize("scene", some(["cameras that err", "doors, sensors, layers"], 2))
-def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene: str) -> None:
+def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene):
     simulation, ways = Simulation(SCENES[scene]()), random.Random(scene)
     while not simulation.done:
         simulation.advance(ways.choice([1, 7, 300, 611]))
@@ -158,7 +158,7 @@ def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene: str) -> None:
 
 
 @pytest.mark.slow
-def test_copies_can_be_changed_without_the_other_noticing() -> None:
+def test_copies_can_be_changed_without_the_other_noticing():
     simulation = Simulation(house())
     simulation.advance(350)
     twins = [way(simulation) for way in some([*WAYS.values()], 2)]
@@ -172,7 +172,7 @@ def test_copies_can_be_changed_without_the_other_noticing() -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_copy_keeps_what_was_done_and_what_is_still_to_be_done(way: str) -> None:
+def test_a_copy_keeps_what_was_done_and_what_is_still_to_be_done(way):
     content = everything("20 min")
     later = [{"do": "put", "step": 900, "entity": "ben", "to": "kitchen", "heading_deg": 5}]
     simulation = Simulation(content, interventions=later)
@@ -185,7 +185,7 @@ def test_a_copy_keeps_what_was_done_and_what_is_still_to_be_done(way: str) -> No
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_listener_stays_with_the_one_that_it_listens_to(way: str) -> None:
+def test_a_listener_stays_with_the_one_that_it_listens_to(way):
     simulation, heard = Simulation(everything("20 min")), list[Event]()
     simulation.listen(heard.extend)
     simulation.advance(600)
@@ -196,7 +196,7 @@ def test_a_listener_stays_with_the_one_that_it_listens_to(way: str) -> None:
     assert before < len(heard)
 
 
-def test_copies_in_memory_share_what_never_changes() -> None:
+def test_copies_in_memory_share_what_never_changes():
     simulation = Simulation(everything("20 min"))
     simulation.advance(600)
     twin = copy.deepcopy(simulation)
@@ -209,7 +209,7 @@ def test_copies_in_memory_share_what_never_changes() -> None:
         assert actor is not twin.actors[name]
 
 
-def test_copies_in_memory_share_rows_that_are_not_stored_yet_and_add_their_own() -> None:
+def test_copies_in_memory_share_rows_that_are_not_stored_yet_and_add_their_own():
     simulation = Simulation("bundled:paper", "simulation.duration=1 d", seed=4)
     simulation.run_until("08:00")
     copied = copy.deepcopy(simulation)
@@ -223,7 +223,7 @@ def test_copies_in_memory_share_rows_that_are_not_stored_yet_and_add_their_own()
     assert len(recent) > len(older) > 0
 
 
-def test_a_read_simulation_has_one_home_and_one_clock() -> None:
+def test_a_read_simulation_has_one_home_and_one_clock():
     twin = through_a_stream(Simulation(house()))
     for actor in twin.actors.values():
         assert actor.home is twin.home
@@ -234,7 +234,7 @@ def test_a_read_simulation_has_one_home_and_one_clock() -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_finished_run_does_not_go_on_in_a_copy(way: str) -> None:
+def test_a_finished_run_does_not_go_on_in_a_copy(way):
     simulation = Simulation(everything("25 min"))
     stored = simulation.run()
     with pytest.raises(InputError, match="finished"):
@@ -243,7 +243,7 @@ def test_a_finished_run_does_not_go_on_in_a_copy(way: str) -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_run_that_broke_off_does_not_go_on_in_a_copy(way: str) -> None:
+def test_a_run_that_broke_off_does_not_go_on_in_a_copy(way):
     bad = {"bad": {"type": "tests.own_components:Bad", "period": "1 min"}}
     simulation = Simulation(scenario("10 min", algorithms=bad))
     with pytest.raises(ComponentError):
@@ -270,7 +270,7 @@ def saved(path: Path, content: dict[str, Any] | None = None, steps: int = 500) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", some(["doors, sensors, layers", "cameras that err"], 2))
-def test_another_process_goes_on_from_a_file(scene: str, tmp_path: Path) -> None:
+def test_another_process_goes_on_from_a_file(scene, tmp_path):
     path = saved(tmp_path / "run.fleet2d", SCENES[scene](), 555)
     done = process("-c", LOAD, str(path), timeout=300, PYTHONHASHSEED="3")
     assert 0 == done.returncode, done.stderr
@@ -308,9 +308,7 @@ print(simulation.run().digest)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("module", some(["from the folder", "imported before"], 2))
-def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_other(
-    module: str, tmp_path: Path
-) -> None:
+def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_other(module, tmp_path):
     """The state spoke of looks.Looks, the other process of its own name for the folder's looks."""
     (tmp_path / "looks.py").write_text(OWN)
     path = tmp_path / "run.fleet2d"
@@ -322,14 +320,14 @@ def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_othe
     assert whole.stdout == done.stdout
 
 
-def test_a_file_of_the_same_state_is_the_same_in_any_process(tmp_path: Path) -> None:
+def test_a_file_of_the_same_state_is_the_same_in_any_process(tmp_path):
     """But for the time that it took until then."""
     one, other = (open_snapshot(saved(tmp_path / name), PURPOSE) for name in "ab")
     assert one[0].keys() == other[0].keys()
     assert one[1].read() == other[1].read()
 
 
-def test_saving_replaces_a_file_and_leaves_nothing_else(tmp_path: Path) -> None:
+def test_saving_replaces_a_file_and_leaves_nothing_else(tmp_path):
     path = tmp_path / "run.fleet2d"
     path.write_text("old")
     simulation = Simulation(everything("20 min"))
@@ -340,7 +338,7 @@ def test_saving_replaces_a_file_and_leaves_nothing_else(tmp_path: Path) -> None:
     assert 100 == Simulation.load(path).step
 
 
-def test_a_simulation_that_stores_in_a_directory_is_not_saved(tmp_path: Path) -> None:
+def test_a_simulation_that_stores_in_a_directory_is_not_saved(tmp_path):
     simulation = Simulation(scenario("2 min"), out=tmp_path / "run")
     for way in WAYS.values():
         with pytest.raises(ArtifactError, match="stores in"):
@@ -348,7 +346,7 @@ def test_a_simulation_that_stores_in_a_directory_is_not_saved(tmp_path: Path) ->
     simulation.finish()
 
 
-def test_a_place_where_nothing_can_be_written_is_an_error_in_words(tmp_path: Path) -> None:
+def test_a_place_where_nothing_can_be_written_is_an_error_in_words(tmp_path):
     simulation = Simulation(scenario("2 min"))
     with pytest.raises(ArtifactError, match=r"run can't be written: No such file"):
         simulation.save(tmp_path / "nowhere" / "run")
@@ -361,7 +359,7 @@ def test_a_place_where_nothing_can_be_written_is_an_error_in_words(tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", ["nowhere", "folder"])
-def test_a_file_that_is_not_there_is_an_error_in_words(tmp_path: Path, name: str) -> None:
+def test_a_file_that_is_not_there_is_an_error_in_words(tmp_path, name):
     (tmp_path / "folder").mkdir()
     with pytest.raises(ArtifactError, match=rf"{name} can't be read: "):
         Simulation.load(tmp_path / name)
@@ -379,14 +377,14 @@ def test_a_file_that_is_not_there_is_an_error_in_words(tmp_path: Path, name: str
         bytes(99),
     ],
 )
-def test_a_foreign_file_is_refused_in_plain_words(tmp_path: Path, content: bytes) -> None:
+def test_a_foreign_file_is_refused_in_plain_words(tmp_path, content):
     path = tmp_path / "other"
     path.write_bytes(content)
     with pytest.raises(ArtifactError, match="other is not a saved simulation"):
         Simulation.load(path)
 
 
-def test_a_damaged_file_is_refused_wherever_it_is_damaged(tmp_path: Path) -> None:
+def test_a_damaged_file_is_refused_wherever_it_is_damaged(tmp_path):
     path = saved(tmp_path / "run")
     whole, draws = path.read_bytes(), random.Random(5)
     for place in [
@@ -430,7 +428,7 @@ def header() -> dict[str, Any]:
     return open_snapshot(file, PURPOSE)[0]
 
 
-def test_a_file_of_another_version_says_which(tmp_path: Path) -> None:
+def test_a_file_of_another_version_says_which(tmp_path):
     with pytest.raises(ArtifactError, match=r"written by Fleet2D 0\.0\.7, and this is"):
         Simulation.load(file_of({**header(), "fleet2d": "0.0.7"}, b""))
 
@@ -439,7 +437,7 @@ def test_a_file_of_another_version_says_which(tmp_path: Path) -> None:
     "body",
     [b"", b"garbage", pickle.dumps(None), pickle.dumps([1, 2]), pickle.dumps({"a": np.float64})],
 )
-def test_a_file_without_a_state_is_refused_in_plain_words(body: bytes) -> None:
+def test_a_file_without_a_state_is_refused_in_plain_words(body):
     with pytest.raises(ArtifactError, match="no state of a run"):
         Simulation.load(file_of(header(), body))
 
@@ -463,9 +461,7 @@ SEALS: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("seal", SEALS)
-def test_a_file_that_this_user_has_not_saved_is_not_unpickled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seal: str
-) -> None:
+def test_a_file_that_this_user_has_not_saved_is_not_unpickled(tmp_path, monkeypatch, seal):
     monkeypatch.chdir(tmp_path)
     body = pickle.dumps(Calls(os.system, "touch made"))
     with pytest.raises(ArtifactError, match="not signed by this user"):
@@ -473,9 +469,7 @@ def test_a_file_that_this_user_has_not_saved_is_not_unpickled(
     assert [] == list(tmp_path.iterdir())
 
 
-def test_without_a_key_a_simulation_is_not_saved_and_can_be_pickled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_key_a_simulation_is_not_saved_and_can_be_pickled(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
     simulation = Simulation(scenario("2 min"))
@@ -532,7 +526,7 @@ def keeping(what: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("what", ["plain", "objects", "random", "home", "itself"])
 @pytest.mark.parametrize("way", WAYS)
-def test_what_a_component_keeps_goes_with_it(what: str, way: str) -> None:
+def test_what_a_component_keeps_goes_with_it(what, way):
     simulation = Simulation(keeping(what))
     simulation.advance(301)
     twin = WAYS[way](simulation)
@@ -549,7 +543,7 @@ def test_what_a_component_keeps_goes_with_it(what: str, way: str) -> None:
 
 
 @pytest.mark.parametrize("what", ["file", "generator", "lambda"])
-def test_what_can_not_be_written_is_an_error_in_words(what: str, tmp_path: Path) -> None:
+def test_what_can_not_be_written_is_an_error_in_words(what, tmp_path):
     simulation = Simulation(keeping(what))
     simulation.advance(301)
     with pytest.raises(ArtifactError, match="the state of the run can't be written: "):
@@ -560,7 +554,7 @@ def test_what_can_not_be_written_is_an_error_in_words(what: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_method_that_a_behavior_keeps_is_its_copy_s_own(way: str) -> None:
+def test_a_method_that_a_behavior_keeps_is_its_copy_s_own(way):
     content = scenario("10 min", users={"ana": {"behaviors": [{"type": f"{__name__}:Bound"}]}})
     simulation = Simulation(content)
     simulation.advance(77)

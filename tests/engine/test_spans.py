@@ -21,12 +21,12 @@ SPANS = [None, 3600, 7, 1]
 
 
 @pytest.fixture(scope="module")
-def whole() -> Run:
+def whole():
     """Two hours with every behavior, in spans as long as they get."""
     return run(everything())
 
 
-def test_the_scenario_of_these_tests_has_every_kind_of_row(whole: Run) -> None:
+def test_the_scenario_of_these_tests_has_every_kind_of_row(whole):
     events = table(whole, "events")
     assert {
         "user_seen",
@@ -51,7 +51,7 @@ def test_the_scenario_of_these_tests_has_every_kind_of_row(whole: Run) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("span", some(SPANS[1:], 2))
-def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> None:
+def test_every_table_is_the_same_for_every_max_span(whole, span):
     other = run(everything(), max_span=span)
     assert digests(whole) == digests(other)
     assert whole.metrics == other.metrics
@@ -61,8 +61,8 @@ def test_every_table_is_the_same_for_every_max_span(whole: Run, span: int) -> No
     ("steps", "gathered", "rows"), some([(64, 50, 97), (1000, 1, 1), (7, 3000, 8)], 2)
 )
 def test_every_table_is_the_same_however_rows_are_gathered_and_stored(
-    whole: Run, monkeypatch: pytest.MonkeyPatch, steps: int, gathered: int, rows: int
-) -> None:
+    whole, monkeypatch, steps, gathered, rows
+):
     """Blocks of poses, rows on their way to the store and row groups all end somewhere else."""
     monkeypatch.setattr("fleet2d.engine.state.MAX_STEPS", 1)
     monkeypatch.setattr("fleet2d.engine.state.MIN_STEPS", steps)
@@ -73,7 +73,7 @@ def test_every_table_is_the_same_however_rows_are_gathered_and_stored(
     assert digests(whole) == digests(run(everything()))
 
 
-def test_an_algorithm_after_every_step_sees_the_same_for_every_max_span() -> None:
+def test_an_algorithm_after_every_step_sees_the_same_for_every_max_span():
     first, *others = (digests(run(every_step(), max_span=span)) for span in SPANS)
     assert "tick" in first
     for other in others:
@@ -81,7 +81,7 @@ def test_an_algorithm_after_every_step_sees_the_same_for_every_max_span() -> Non
 
 
 @pytest.mark.slow
-def test_steps_longer_and_shorter_than_a_second_give_the_same_for_every_max_span() -> None:
+def test_steps_longer_and_shorter_than_a_second_give_the_same_for_every_max_span():
     for step, duration in (("250 ms", "8 min"), ("7 s", "1 h 10 min"), ("1 min", "3 h")):
         content = everything(duration)
         content["simulation"]["step"] = step
@@ -97,7 +97,7 @@ def test_steps_longer_and_shorter_than_a_second_give_the_same_for_every_max_span
         assert [first, first] == others, step
 
 
-def test_chunks_of_any_size_add_up_to_the_same_run(whole: Run) -> None:
+def test_chunks_of_any_size_add_up_to_the_same_run(whole):
     simulation = fleet2d.Simulation(everything())
     size = 1
     while not simulation.done:
@@ -106,7 +106,7 @@ def test_chunks_of_any_size_add_up_to_the_same_run(whole: Run) -> None:
     assert digests(whole) == digests(simulation.finish())
 
 
-def test_running_until_times_adds_up_to_the_same_run(whole: Run) -> None:
+def test_running_until_times_adds_up_to_the_same_run(whole):
     simulation = fleet2d.Simulation(everything())
     simulation.run_until(timedelta(minutes=31, seconds=7, milliseconds=500))
     assert 31 * 60 + 8 == simulation.step
@@ -117,7 +117,7 @@ def test_running_until_times_adds_up_to_the_same_run(whole: Run) -> None:
 
 
 @pytest.mark.parametrize("at", some([1, 1801, 3599], 2))
-def test_copies_made_in_the_middle_live_the_same_future(whole: Run, at: int) -> None:
+def test_copies_made_in_the_middle_live_the_same_future(whole, at):
     simulation = fleet2d.Simulation(everything())
     simulation.advance(at)
     copies = [copy.deepcopy(simulation) for _ in range(2)]
@@ -126,7 +126,7 @@ def test_copies_made_in_the_middle_live_the_same_future(whole: Run, at: int) -> 
     assert [digests(whole)] * 3 == futures
 
 
-def test_a_copy_does_not_disturb_the_original() -> None:
+def test_a_copy_does_not_disturb_the_original():
     simulation = fleet2d.Simulation(everything("20 min"))
     simulation.advance(333)
     before = simulation.state
@@ -171,14 +171,12 @@ def digest_elsewhere(content: dict[str, Any], folder: Path, **environment: str) 
     ),
     ids=lambda environment: f"{environment['OMP_NUM_THREADS']} threads",
 )
-def test_another_process_gets_the_same_run(
-    whole: Run, tmp_path: Path, environment: dict[str, str]
-) -> None:
+def test_another_process_gets_the_same_run(whole, tmp_path, environment):
     assert whole.digest == digest_elsewhere(everything(), tmp_path, **environment)
 
 
 @pytest.mark.slow
-def test_numpy_for_an_older_processor_gives_the_same_run(whole: Run, tmp_path: Path) -> None:
+def test_numpy_for_an_older_processor_gives_the_same_run(whole, tmp_path):
     # What NumPy doesn't know, or has built in, it warns about; and NumPy on other machines has others.
     features = "AVX2 FMA3 AVX512F AVX512_SKX AVX512CD AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR X86_V3 X86_V4"
     environment = {"NPY_DISABLE_CPU_FEATURES": features, "PYTHONWARNINGS": "ignore"}
@@ -215,7 +213,7 @@ def changed(**sections: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def reference() -> Run:
+def reference():
     """What the runs with somebody more are compared with."""
     return run(alone("40 min"))
 
@@ -223,20 +221,20 @@ def reference() -> Run:
 EVERYBODY = ("ana", "ben", "astro", "bolt", "curio", "drift", "ego")
 
 
-def test_a_robot_more_leaves_users_and_other_robots_as_they_were(reference: Run) -> None:
+def test_a_robot_more_leaves_users_and_other_robots_as_they_were(reference):
     more = run(changed(robots={"zed": {"type": "meander"}, "yak": {"type": f"{OWN}:Greet"}}))
     # Ego acts on what all robots see.
     others = [name for name in EVERYBODY if name != "ego"]
     assert lives(reference, *others) == lives(more, *others)
 
 
-def test_a_user_more_leaves_users_and_robots_that_do_not_react_as_they_were(reference: Run) -> None:
+def test_a_user_more_leaves_users_and_robots_that_do_not_react_as_they_were(reference):
     more = run(changed(users={"zoe": {"type": "meander"}}))
     bystanders = ("ana", "ben", "curio", "drift")
     assert lives(reference, *bystanders) == lives(more, *bystanders)
 
 
-def test_a_user_more_leaves_what_is_detected_of_the_others_as_it_was(reference: Run) -> None:
+def test_a_user_more_leaves_what_is_detected_of_the_others_as_it_was(reference):
     more = run(changed(users={"zoe": {"type": "meander"}}))
     for user in ("ana", "ben"):
         before, after = (
@@ -247,7 +245,7 @@ def test_a_user_more_leaves_what_is_detected_of_the_others_as_it_was(reference: 
         assert before["x"].tolist() == after["x"].tolist()
 
 
-def test_an_algorithm_and_a_metric_more_leave_everything_as_it_was(reference: Run) -> None:
+def test_an_algorithm_and_a_metric_more_leave_everything_as_it_was(reference):
     more = run(
         changed(
             algorithms={"other": {"type": f"{OWN}:Tick", "period": "13 s"}},
@@ -260,13 +258,13 @@ def test_an_algorithm_and_a_metric_more_leave_everything_as_it_was(reference: Ru
     }
 
 
-def test_a_robot_that_behaves_otherwise_leaves_the_users_as_they_were(reference: Run) -> None:
+def test_a_robot_that_behaves_otherwise_leaves_the_users_as_they_were(reference):
     content = alone("40 min")
     content["robots"]["astro"] = {"type": "meander", "radius": 0.3}
     assert lives(reference, "ana", "ben") == lives(run(content), "ana", "ben")
 
 
-def test_another_seed_is_another_life(reference: Run) -> None:
+def test_another_seed_is_another_life(reference):
     other = run(everything("40 min"), seed=5)
     assert lives(reference, "ben") != lives(other, "ben")
     assert lives(reference, "ana") != lives(other, "ana")
@@ -279,7 +277,7 @@ def test_another_seed_is_another_life(reference: Run) -> None:
 # --- Pinned ------------------------------------------------------------------------------------
 
 
-def test_digests_are_those_pinned(whole: Run) -> None:
+def test_digests_are_those_pinned(whole):
     result = {
         "paper, 1 day": fleet2d.run("bundled:paper", "simulation.duration=1 d").digest,
         "family, 1 day": fleet2d.run("bundled:family", "simulation.duration=1 d").digest,

@@ -36,7 +36,7 @@ class Short(EventStream):
     CAPACITY = 5
 
 
-def test_every_sink_is_handed_each_event_once_in_the_order_it_became_known() -> None:
+def test_every_sink_is_handed_each_event_once_in_the_order_it_became_known():
     sinks = [Sink(), Sink()]
     stream = EventStream(sinks)
     stream.emit([event(7), event(3)])
@@ -46,7 +46,7 @@ def test_every_sink_is_handed_each_event_once_in_the_order_it_became_known() -> 
         assert [[event(7), event(3)], [event(5)]] == sink.taken
 
 
-def test_events_since_a_step_are_in_order_of_step_and_of_kind() -> None:
+def test_events_since_a_step_are_in_order_of_step_and_of_kind():
     stream = EventStream()
     seen, shut, found = event(4, "user_seen"), event(4, "shut", HOME), event(4)
     stream.emit([event(9), seen, shut])
@@ -56,14 +56,14 @@ def test_events_since_a_step_are_in_order_of_step_and_of_kind() -> None:
     assert [] == stream.since(10)
 
 
-def test_events_of_one_step_and_kind_stay_in_the_order_they_became_known() -> None:
+def test_events_of_one_step_and_kind_stay_in_the_order_they_became_known():
     stream = EventStream()
     emitted = [event(4, "found", name) for name in ("zoe", "ana", "ben")]
     stream.emit(emitted)
     assert emitted == stream.since(4)
 
 
-def test_events_that_are_no_longer_kept_are_asked_for_in_vain() -> None:
+def test_events_that_are_no_longer_kept_are_asked_for_in_vain():
     stream = Short()
     stream.emit([event(step) for step in range(5)])
     assert list(range(5)) == [e.step for e in stream.since(0)]
@@ -73,7 +73,7 @@ def test_events_that_are_no_longer_kept_are_asked_for_in_vain() -> None:
         stream.since(1)
 
 
-def test_what_became_known_late_is_missed_up_to_its_step() -> None:
+def test_what_became_known_late_is_missed_up_to_its_step():
     stream = Short()
     stream.emit([event(90), event(1), event(2)])
     stream.emit([event(3), event(4), event(5)])
@@ -82,7 +82,7 @@ def test_what_became_known_late_is_missed_up_to_its_step() -> None:
     assert [] == stream.since(91)
 
 
-def test_more_events_at_once_than_are_kept_leave_the_last() -> None:
+def test_more_events_at_once_than_are_kept_leave_the_last():
     stream, sink = Short(), Sink()
     stream.sinks.append(sink)
     stream.emit([event(step) for step in range(12)])
@@ -92,7 +92,7 @@ def test_more_events_at_once_than_are_kept_leave_the_last() -> None:
         stream.since(6)
 
 
-def test_a_function_listens_and_stays_behind_when_a_stream_is_copied() -> None:
+def test_a_function_listens_and_stays_behind_when_a_stream_is_copied():
     heard: list[Event] = []
     sink = Sink()
     stream = EventStream([sink])
@@ -109,7 +109,7 @@ def test_a_function_listens_and_stays_behind_when_a_stream_is_copied() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 4, 5, 9])
-def test_a_copied_stream_has_the_same_events_and_keeps_as_many(count: int) -> None:
+def test_a_copied_stream_has_the_same_events_and_keeps_as_many(count):
     stream = Short()
     for step in range(count):
         stream.emit([Event(step, "ana", EventKind.FOUND if step % 2 else "waves", f"é{step}")])
@@ -122,7 +122,7 @@ def test_a_copied_stream_has_the_same_events_and_keeps_as_many(count: int) -> No
             copied.since(0)
 
 
-def test_plans_come_before_cameras_and_the_home_comes_last() -> None:
+def test_plans_come_before_cameras_and_the_home_comes_last():
     rank = {kind: event(0, kind).rank for kind in EventKind}
     assert {0} == {rank[kind] for kind in EventKind if kind not in SIGHTS | CHANGES}
     assert {1} == {rank[kind] for kind in SIGHTS}
@@ -130,7 +130,7 @@ def test_plans_come_before_cameras_and_the_home_comes_last() -> None:
     assert 0 == event(0, "of a behavior's own").rank
 
 
-def test_a_kind_is_its_text() -> None:
+def test_a_kind_is_its_text():
     assert "user_seen" == EventKind.USER_SEEN == str(EventKind.USER_SEEN)
     assert Event(1, "a", EventKind.SHUT, "") == Event(1, "a", "shut", "")
     assert all(kind.value == kind.name.lower() for kind in EventKind)
@@ -159,13 +159,13 @@ def rows(stored: Any) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.parametrize("span", [None, 1, 61])
-def test_a_sink_hears_just_the_rows_of_the_table(span: int | None) -> None:
+def test_a_sink_hears_just_the_rows_of_the_table(span):
     heard, stored = listened(everything("20 min"), max_span=span)
     assert len(heard) > 50
     assert sorted(map(tuple, heard)) == sorted(rows(stored))
 
 
-def test_the_table_is_in_order_of_step_entity_and_rank() -> None:
+def test_the_table_is_in_order_of_step_entity_and_rank():
     content = everything(
         "1 h", objects={"door": {"type": "door", "doorway": "living_room_1-kitchen_1"}}
     )
@@ -177,13 +177,13 @@ def test_the_table_is_in_order_of_step_entity_and_rank() -> None:
     assert {"shut", "opened"} <= {kind for _, _, kind, _ in rows(stored)}
 
 
-def test_every_kind_of_the_table_is_known_or_a_behavior_s_own() -> None:
+def test_every_kind_of_the_table_is_known_or_a_behavior_s_own():
     kinds = set(table(run(everything("1 h")), "events")["event"])
     assert {"reacts", "obeys", "user_seen"} <= kinds
     assert kinds - {*EventKind} == {"obeys"}
 
 
-def test_events_since_a_step_are_the_rows_of_the_table_from_then_on() -> None:
+def test_events_since_a_step_are_the_rows_of_the_table_from_then_on():
     simulation = fleet2d.Simulation(everything("20 min"))
     simulation.advance(700)
     state = simulation._state
@@ -194,6 +194,6 @@ def test_events_since_a_step_are_the_rows_of_the_table_from_then_on() -> None:
     assert np.all(np.diff([step for step, *_ in known]) >= 0)
 
 
-def test_who_is_away_and_who_has_no_camera_is_heard_of_too() -> None:
+def test_who_is_away_and_who_has_no_camera_is_heard_of_too():
     heard, _ = listened(scenario("10 min", users={"ana": {"type": "meander"}}))
     assert [] == heard

@@ -26,7 +26,7 @@ SPRING = "simulation.start=2026-03-28T23:00"
 
 
 @pytest.mark.parametrize("start", [AUTUMN, SPRING])
-def test_household_lives_through_both_nights_the_same_for_every_span(start: str) -> None:
+def test_household_lives_through_both_nights_the_same_for_every_span(start):
     """With all that a robot learns, and darkness."""
     overrides = [BERLIN, start, "simulation.duration=5 h", "simulation.step=5 s"]
     overrides += ["users.pat={type: population}", "simulation.daylight={latitude: 52.5}"]
@@ -39,7 +39,7 @@ def test_household_lives_through_both_nights_the_same_for_every_span(start: str)
 
 
 @pytest.mark.parametrize("zone", ["UTC", "Asia/Tokyo", "Etc/GMT+12"])
-def test_zone_without_changes_is_a_run_without_zone_but_for_its_stamps(zone: str) -> None:
+def test_zone_without_changes_is_a_run_without_zone_but_for_its_stamps(zone):
     """Over New Year, also twelve hours behind UTC."""
     overrides = ["simulation.start=2026-12-31T20:00", "simulation.duration=6 h"]
     plain = fleet2d.run("bundled:family", *overrides, seed=4)
@@ -54,7 +54,7 @@ def test_zone_without_changes_is_a_run_without_zone_but_for_its_stamps(zone: str
     assert zoned.clock.time(4 * 3600).isoformat()[:19] == "2027-01-01T00:00:00"
 
 
-def test_rules_of_another_year_and_of_a_clock_put_back_over_midnight_run() -> None:
+def test_rules_of_another_year_and_of_a_clock_put_back_over_midnight_run():
     """In Newfoundland, the second half past eleven belongs to the day before."""
     night = nights("America/St_Johns", 2010)[1]
     zone = ["simulation.time_zone=America/St_Johns", f"simulation.start={night.begin.isoformat()}"]
@@ -64,9 +64,7 @@ def test_rules_of_another_year_and_of_a_clock_put_back_over_midnight_run() -> No
     assert len({time.date() for time in asleep}) >= 2
 
 
-def test_run_is_repeated_and_read_by_the_offsets_that_it_stored(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_run_is_repeated_and_read_by_the_offsets_that_it_stored(tmp_path, monkeypatch):
     """On a machine with other rules, or none."""
     overrides = [BERLIN, AUTUMN, "simulation.duration=5 h"]
     run = fleet2d.run("bundled:family", *overrides, seed=4, out=tmp_path / "run")
@@ -84,7 +82,7 @@ def test_run_is_repeated_and_read_by_the_offsets_that_it_stored(
         load_scenario("bundled:family", *overrides)
 
 
-def test_damaged_offsets_of_a_manifest_are_refused(tmp_path: Path) -> None:
+def test_damaged_offsets_of_a_manifest_are_refused(tmp_path):
     """With the key that is wrong."""
     fleet2d.run("bundled:paper", BERLIN, "simulation.duration=1 min", out=tmp_path / "run")
     path = tmp_path / "run" / "manifest.json"
@@ -95,7 +93,7 @@ def test_damaged_offsets_of_a_manifest_are_refused(tmp_path: Path) -> None:
         fleet2d.open_run(tmp_path / "run")
 
 
-def test_state_saved_in_the_second_hour_goes_on_in_it() -> None:
+def test_state_saved_in_the_second_hour_goes_on_in_it():
     """As a copy, and as a file."""
     simulation = Simulation("bundled:family", BERLIN, AUTUMN, "simulation.duration=6 h", seed=4)
     simulation.run_until("2026-10-25T02:30+01:00")
@@ -108,7 +106,7 @@ def test_state_saved_in_the_second_hour_goes_on_in_it() -> None:
     assert loaded.run().digest == simulation.run().digest
 
 
-def test_exports_have_offsets(tmp_path: Path) -> None:
+def test_exports_have_offsets(tmp_path):
     """CSV and JSON Lines in local time; Parquet and Arrow in instants with the zone."""
     run = fleet2d.run("bundled:family", BERLIN, AUTUMN, "simulation.duration=5 h", seed=4)
     from fleet2d.live.exporters import Selection
@@ -131,7 +129,7 @@ def test_exports_have_offsets(tmp_path: Path) -> None:
     assert str(run.arrow("events").schema.field("time").type) == "timestamp[us, tz=Europe/Berlin]"
 
 
-def test_stamps_of_ros_are_utc(tmp_path: Path) -> None:
+def test_stamps_of_ros_are_utc(tmp_path):
     """Also of a run that begins in the second hour."""
     pytest.importorskip("rosbags")
     start = "simulation.start=2026-10-25T02:10+01:00"
@@ -174,9 +172,7 @@ LOCAL_ROWS = """2026-10-24 22:00,CLOSE
 
 
 @pytest.mark.parametrize("rows", [UTC_ROWS, UTC_ROWS.replace("Z", "+00:00"), LOCAL_ROWS])
-def test_door_that_is_open_for_twenty_minutes_in_the_doubled_hour_reads_so(
-    tmp_path: Path, rows: str
-) -> None:
+def test_door_that_is_open_for_twenty_minutes_in_the_doubled_hour_reads_so(tmp_path, rows):
     """With offsets, and without where readings run backwards."""
     run = fleet2d.run(sensor(tmp_path, rows))
     rows_of_run = run.arrow("sensors").to_pylist()
@@ -186,7 +182,7 @@ def test_door_that_is_open_for_twenty_minutes_in_the_doubled_hour_reads_so(
     ]  # fmt: skip
 
 
-def test_reading_of_which_nobody_knows_the_hour_is_told(tmp_path: Path) -> None:
+def test_reading_of_which_nobody_knows_the_hour_is_told(tmp_path):
     """It counts as of the first."""
     rows = LOCAL_ROWS.replace("2026-10-25 02:10,CLOSE\n", "")
     run = fleet2d.run(sensor(tmp_path, rows))
@@ -196,7 +192,7 @@ def test_reading_of_which_nobody_knows_the_hour_is_told(tmp_path: Path) -> None:
     )
 
 
-def test_log_of_another_time_zone_than_the_home_is_refused(tmp_path: Path) -> None:
+def test_log_of_another_time_zone_than_the_home_is_refused(tmp_path):
     """Its name may be said again, but not another one."""
     same = fleet2d.run(sensor(tmp_path, UTC_ROWS, time_zone="Europe/Berlin"))
     assert same.arrow("sensors").num_rows == 4
@@ -204,9 +200,7 @@ def test_log_of_another_time_zone_than_the_home_is_refused(tmp_path: Path) -> No
         fleet2d.run(sensor(tmp_path, UTC_ROWS, time_zone="Europe/Paris"))
 
 
-def test_log_of_a_summer_is_replayed_in_winter_by_the_local_time_of_its_own_date(
-    tmp_path: Path,
-) -> None:
+def test_log_of_a_summer_is_replayed_in_winter_by_the_local_time_of_its_own_date(tmp_path):
     """The rules of its own date count, not those of the run."""
     content = sensor(tmp_path, "2026-07-01T20:30:00Z,OPEN\n2026-07-01T20:31:00Z,CLOSE\n", day=0)
     content["simulation"]["start"] = "2026-12-01T22:00"
@@ -215,9 +209,7 @@ def test_log_of_a_summer_is_replayed_in_winter_by_the_local_time_of_its_own_date
     assert on["time"].isoformat() == "2026-12-01T22:30:00+01:00"
 
 
-def test_rooms_of_a_smart_home_are_in_local_time_on_both_sides_of_the_change(
-    tmp_path: Path,
-) -> None:
+def test_rooms_of_a_smart_home_are_in_local_time_on_both_sides_of_the_change(tmp_path):
     """CASAS writes no offsets: the second time begins where readings run backwards, else it is told."""
     path = tmp_path / "home.txt"
     lines = ["00:30:00 kitchen", "02:30:00 bedroom", "04:30:00 kitchen"]
@@ -245,9 +237,7 @@ def test_rooms_of_a_smart_home_are_in_local_time_on_both_sides_of_the_change(
         (["02:10:00.5 a", "02:10:00.3 b", "02:40:00 b", "03:20:00 a"], [130, 160]),
     ],
 )
-def test_rows_of_other_tags_and_jitter_begin_no_second_hour(
-    tmp_path: Path, rows: list[str], minutes: list[float]
-) -> None:
+def test_rows_of_other_tags_and_jitter_begin_no_second_hour(tmp_path, rows, minutes):
     path = tmp_path / "tags.csv"
     lines = ["time,id,x,y", *(f"2026-10-25 {row.replace(' ', ',')},1,1" for row in rows)]
     path.write_text("\n".join(lines) + "\n")
@@ -258,7 +248,7 @@ def test_rows_of_other_tags_and_jitter_begin_no_second_hour(
     assert [t // 60_000_000 for t in log.time_us.tolist()] == minutes
 
 
-def test_a_row_that_jitters_in_the_doubled_hour_is_refused_as_in_any_other(tmp_path: Path) -> None:
+def test_a_row_that_jitters_in_the_doubled_hour_is_refused_as_in_any_other(tmp_path):
     path = tmp_path / "tag.csv"
     times = ["02:10:00.5", "02:10:00.3", "02:40:00"]
     path.write_text("\n".join(["time,x,y", *(f"2026-10-25 {t},1,1" for t in times)]) + "\n")
@@ -270,7 +260,7 @@ def test_a_row_that_jitters_in_the_doubled_hour_is_refused_as_in_any_other(tmp_p
     assert [t // 60_000_000 for t in log.time_us.tolist()] == [130, 130, 160]
 
 
-def test_questions_about_a_run_are_in_local_time() -> None:
+def test_questions_about_a_run_are_in_local_time():
     """Of an assistant, by DuckDB."""
     pytest.importorskip("duckdb")
     from fleet2d.live.questions import answer
@@ -282,7 +272,7 @@ def test_questions_about_a_run_are_in_local_time() -> None:
     assert all(str(row["time"]).replace("T", " ").startswith("2026-10-25 02:") for row in rows)
 
 
-def test_beliefs_of_a_run_are_replayed_at_their_moments(tmp_path: Path) -> None:
+def test_beliefs_of_a_run_are_replayed_at_their_moments(tmp_path):
     """Its own table has instants, which need no time zone."""
     keys = [BERLIN, AUTUMN, "simulation.duration=5 h", "algorithms.ltp.period=30 min"]
     first = fleet2d.run("bundled:family", *keys, seed=4, out=tmp_path / "run")
@@ -300,7 +290,7 @@ def test_beliefs_of_a_run_are_replayed_at_their_moments(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("month", range(1, 13))
-def test_sun_rises_and_sets_an_hour_later_by_the_clock_in_summer_time(month: int) -> None:
+def test_sun_rises_and_sets_an_hour_later_by_the_clock_in_summer_time(month):
     """And not in winter, nor in the south the other way round."""
     for zone, summer in (
         ("Europe/Berlin", range(4, 11)),
@@ -321,7 +311,7 @@ def test_sun_rises_and_sets_an_hour_later_by_the_clock_in_summer_time(month: int
 
 
 @pytest.mark.parametrize(("offset", "is_noted"), [("", True), ("+02:00", False), ("+01:00", False)])
-def test_a_start_that_the_clock_reads_twice_is_noted(offset: str, is_noted: bool) -> None:
+def test_a_start_that_the_clock_reads_twice_is_noted(offset, is_noted):
     keys = [BERLIN, f"simulation.start=2026-10-25T02:30{offset}", "simulation.duration=1 h"]
     note = "simulation.start: the clock reads 2026-10-25 02:30 twice"
 
@@ -330,7 +320,7 @@ def test_a_start_that_the_clock_reads_twice_is_noted(offset: str, is_noted: bool
     assert is_noted == any(text.startswith(note) for text in notes)
 
 
-def test_dated_moment_that_is_not_one_is_noted_and_one_with_an_offset_is_exact() -> None:
+def test_dated_moment_that_is_not_one_is_noted_and_one_with_an_offset_is_exact():
     """In a script and in changes of the home."""
     script = '[{at: "2026-10-25T02:30", put: ana, to: kitchen}, {at: "2026-10-25T02:30+01:00", put: ana, to: hallway}]'
     keys = [BERLIN, AUTUMN, "simulation.duration=6 h", f"script={script}"]
@@ -360,14 +350,14 @@ def test_dated_moment_that_is_not_one_is_noted_and_one_with_an_offset_is_exact()
         (["simulation.time_zone={name: Europe/Berlin, offset_s: 1}"], "give standard_s, offset_s and changes"),
     ],
 )  # fmt: skip
-def test_wrong_time_zone_or_offset_is_refused(overrides: list[str], text: str) -> None:
+def test_wrong_time_zone_or_offset_is_refused(overrides, text):
     """With what is wrong and what to do."""
     with pytest.raises(InputError) as error:
         load_scenario("bundled:paper", *overrides)
     assert text in str(error.value)
 
 
-def test_offset_in_a_call_without_time_zone_is_refused() -> None:
+def test_offset_in_a_call_without_time_zone_is_refused():
     """Of a program that watches a run."""
     simulation = Simulation("bundled:paper", "simulation.duration=1 h", seed=4)
     with pytest.raises(InputError, match="has an offset, and the home has no time zone"):
@@ -381,9 +371,7 @@ def test_offset_in_a_call_without_time_zone_is_refused() -> None:
         (SPRING, ["03:00:00+02:00 pill ana", "03:30:00+02:00 pill ana", "05:00:00+02:00 chat ben"]),
     ],
 )
-def test_what_robots_want_at_a_time_is_once_a_night_and_intervals_are_of_real_time(
-    start: str, expected: list[str]
-) -> None:
+def test_what_robots_want_at_a_time_is_once_a_night_and_intervals_are_of_real_time(start, expected):
     """A reminder at 02:30, its deadline half an hour later, and a greeting every five hours."""
     wants = "{pill: {do: remind, to: ana, at: ['02:30'], within: 30 min}, chat: {do: greet, to: ben, every: 5 h, within: 10 min}}"
     keys = [BERLIN, start, "simulation.duration=7 h", f"interactions={wants}"]
@@ -398,7 +386,7 @@ def test_what_robots_want_at_a_time_is_once_a_night_and_intervals_are_of_real_ti
     assert [text for text in texts if "vitamins" not in text] == expected
 
 
-def test_moments_of_commands_are_local_or_exact() -> None:
+def test_moments_of_commands_are_local_or_exact():
     """As `--from` and `--at` take them, in words, in local time, and with an offset."""
     clock = load_scenario(
         "bundled:paper", BERLIN, AUTUMN, "simulation.duration=2 d"

@@ -21,24 +21,24 @@ def small(every: Any) -> dict[str, Any]:
     ("every", "steps"),
     [("1 min", 60), ("10 min", 600), ("every step", 1), ("1 s", 1), ("90 s", 90)],
 )
-def test_trajectories_are_stored_as_often_as_asked(every: Any, steps: int) -> None:
+def test_trajectories_are_stored_as_often_as_asked(every, steps):
     rows = table(run(small(every)), "trajectories", entity="ben")
     assert list(range(0, 1800, steps)) == rows["step"].tolist()
 
 
-def test_what_is_sampled_rarely_is_part_of_what_is_sampled_often() -> None:
+def test_what_is_sampled_rarely_is_part_of_what_is_sampled_often():
     often, rarely = (table(run(small(every)), "trajectories") for every in ("every step", "3 min"))
     kept = often["step"] % 180 == 0
     for column, values in rarely.items():
         assert often[column][kept].tolist() == values.tolist()
 
 
-def test_an_interval_that_is_no_multiple_of_the_step_is_refused() -> None:
+def test_an_interval_that_is_no_multiple_of_the_step_is_refused():
     with pytest.raises(ScenarioError, match=r"artifacts\.trajectories.*multiple"):
         run(small("1.5 s"))
 
 
-def test_where_somebody_away_is_is_not_told() -> None:
+def test_where_somebody_away_is_is_not_told():
     truth = table(run(everything("2 h")), "trajectories", entity="ana")
     gone = truth["away"]
     assert gone.any()

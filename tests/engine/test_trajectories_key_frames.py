@@ -3,7 +3,7 @@
 from tests.scenes import everything, path, run, scenario, table
 
 
-def test_stored_poses_are_those_rebuilt_from_key_frames() -> None:
+def test_stored_poses_are_those_rebuilt_from_key_frames():
     stored = run(everything("1 h"), "artifacts.trajectories=every step")
     for name in ("ana", "ben", "astro", "bolt", "drift", "ego"):
         rows, poses = table(stored, "trajectories", entity=name), path(stored, name)
@@ -14,7 +14,7 @@ def test_stored_poses_are_those_rebuilt_from_key_frames() -> None:
         assert rows["heading"].tolist() == poses.heading.tolist()
 
 
-def test_key_frames_are_few_and_as_few_whatever_the_step() -> None:
+def test_key_frames_are_few_and_as_few_whatever_the_step():
     """A segment has its two ends, however many steps it takes."""
     users = {
         "ana": {"type": "schedule", "days": [{"items": [{"at": "07:05", "place": "kitchen"}]}]}

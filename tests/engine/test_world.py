@@ -2,7 +2,6 @@
 
 import copy
 import io
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,11 +49,11 @@ def acts(run: fleet2d.Run) -> list[tuple[int, str, str]]:
 
 
 @pytest.fixture(scope="module")
-def lively() -> fleet2d.Run:
+def lively():
     return fleet2d.run(home(LIVELY))
 
 
-def test_each_entry_is_done_at_its_step(lively: fleet2d.Run) -> None:
+def test_each_entry_is_done_at_its_step(lively):
     done = acts(lively)
     assert (300, "put", "script.0") in done
     assert done.index((300, "put", "script.0")) + 1 == done.index((300, "send", "script.1"))
@@ -75,13 +74,13 @@ def test_each_entry_is_done_at_its_step(lively: fleet2d.Run) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("max_span", [1, 7])
-def test_spans_are_invisible(lively: fleet2d.Run, max_span: int) -> None:
+def test_spans_are_invisible(lively, max_span):
     again = fleet2d.run(home(LIVELY), max_span=max_span)
     assert digests(lively) == digests(again)
     assert lively.manifest["interventions"] == again.manifest["interventions"]
 
 
-def test_a_run_with_a_script_and_somebody_outside_is_reproduced(tmp_path: Path) -> None:
+def test_a_run_with_a_script_and_somebody_outside_is_reproduced(tmp_path):
     run = fleet2d.Simulation(home(LIVELY), out=tmp_path / "run")
     run.advance(305)
     run.do(HoldStill("astro", duration="1 min"))
@@ -92,7 +91,7 @@ def test_a_run_with_a_script_and_somebody_outside_is_reproduced(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("way", ["copy", "save"])
-def test_copies_keep_what_a_script_still_waits_for(lively: fleet2d.Run, way: str) -> None:
+def test_copies_keep_what_a_script_still_waits_for(lively, way):
     run = fleet2d.Simulation(home(LIVELY))
     run.advance(500)
     if way == "copy":
@@ -106,16 +105,14 @@ def test_copies_keep_what_a_script_still_waits_for(lively: fleet2d.Run, way: str
     assert lively.manifest["interventions"] == twin.finish().manifest["interventions"]
 
 
-def test_a_run_that_was_interrupted_goes_on_with_its_script(
-    lively: fleet2d.Run, tmp_path: Path
-) -> None:
+def test_a_run_that_was_interrupted_goes_on_with_its_script(lively, tmp_path):
     run = fleet2d.Simulation(home(LIVELY), out=tmp_path / "run")
     run.advance(1000)
     run.finish()
     assert lively.digest == fleet2d.resume(tmp_path / "run").digest
 
 
-def test_nobody_else_changes_by_what_is_done_to_one() -> None:
+def test_nobody_else_changes_by_what_is_done_to_one():
     script = [
         {"at": "5 min", "put": "ben", "to": "bedroom"},
         {"at": "6 min", "send": "ben", "to": "living_room", "duration": "3 min"},
@@ -127,7 +124,7 @@ def test_nobody_else_changes_by_what_is_done_to_one() -> None:
         np.testing.assert_array_equal(one[column], other[column])
 
 
-def test_a_scenario_without_a_script_waits_for_nothing() -> None:
+def test_a_scenario_without_a_script_waits_for_nothing():
     run = fleet2d.Simulation(home([]))
     interventions = run._state.interventions
     assert interventions.next_due() is None
@@ -135,7 +132,7 @@ def test_a_scenario_without_a_script_waits_for_nothing() -> None:
     assert frozenset() == run._state.awaited
 
 
-def test_an_entry_on_an_event_is_done_once_unless_each_time_is_wanted() -> None:
+def test_an_entry_on_an_event_is_done_once_unless_each_time_is_wanted():
     script = [
         {"on": "user_seen", "replan": "ben"},
         {"on": "user_seen", "each": True, "replan": "ben"},
@@ -170,12 +167,12 @@ def test_an_entry_on_an_event_is_done_once_unless_each_time_is_wanted() -> None:
         ({"on": ["shut", "contact"], "hold": "ana"}, "can never happen to contact"),
     ],
 )
-def test_what_can_not_be_is_refused_before_the_run(entry: dict[str, Any], words: str) -> None:
+def test_what_can_not_be_is_refused_before_the_run(entry, words):
     with pytest.raises((ScenarioError, fleet2d.InputError), match=rf"script\.1: .*{words}"):
         fleet2d.Simulation(home([{"at": "1 s", "hold": "ben"}, entry]))
 
 
-def test_a_wrong_entry_is_named_by_its_line(tmp_path: Path) -> None:
+def test_a_wrong_entry_is_named_by_its_line(tmp_path):
     file = tmp_path / "home.yaml"
     file.write_text(
         "extends: bundled:paper\n"

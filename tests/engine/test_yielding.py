@@ -76,7 +76,7 @@ def corridor(tmp_path: Path, width: float = 0.5) -> dict[str, Any]:
     return {"type": "native", "path": str(file)}
 
 
-def test_two_robots_on_one_spot_part_and_never_meet_again() -> None:
+def test_two_robots_on_one_spot_part_and_never_meet_again():
     """The complaint: two on the same spot for an hour."""
     content = scenario("1 h", robots={"butler": robot([2, 3]), "guard": robot([2, 3])})
     stored = assert_same_for_every_max_span(content, 61, 1)
@@ -85,7 +85,7 @@ def test_two_robots_on_one_spot_part_and_never_meet_again() -> None:
 
 
 @pytest.mark.parametrize("people_block", [None, "3 s"])
-def test_two_robots_that_go_to_one_spot_stop_beside_each_other(people_block: str | None) -> None:
+def test_two_robots_that_go_to_one_spot_stop_beside_each_other(people_block):
     robots = {"butler": robot([1, 1], [3, 3], 600.0), "guard": robot([4, 1], [3, 3], 600.0)}
     content = scenario("5 min", robots=robots, simulation={"people_block": people_block})
     stored = assert_same_for_every_max_span(content, 61, 1)
@@ -94,20 +94,20 @@ def test_two_robots_that_go_to_one_spot_stop_beside_each_other(people_block: str
     assert np.hypot(*(np.array(ends_at(stored, "guard")) - 3)) < 0.6
 
 
-def test_ghosts_pass_through_each_other() -> None:
+def test_ghosts_pass_through_each_other():
     robots = {"butler": robot([1, 3], [4, 3], 60.0), "guard": robot([2.5, 3])}
     stored = run(scenario("1 min", robots=robots, simulation={"ghosts": True}))
     assert nearest(stored, "butler", "guard") < 0
     assert not told(stored, "gives_way", "overlaps")
 
 
-def test_robots_that_are_drawn_begin_apart() -> None:
+def test_robots_that_are_drawn_begin_apart():
     robots = {f"r{i}": {"start": "bathroom", "camera": None} for i in range(6)}
     stored = run(scenario("10 s", robots=robots))
     assert all(nearest(stored, *pair) >= 0 for pair in combinations(robots, 2))
 
 
-def test_two_who_meet_in_a_corridor_of_one_s_width_both_get_through(tmp_path: Path) -> None:
+def test_two_who_meet_in_a_corridor_of_one_s_width_both_get_through(tmp_path):
     robots = {"butler": robot([1.0, 1.5], [10.0, 1.5], 900.0), "guard": robot([10.5, 1.5], [1.0, 1.5], 900.0)}  # fmt: skip
     content = {**scenario("4 min", robots=robots), "floorplan": corridor(tmp_path)}
     stored = assert_same_for_every_max_span(content, 61, 7, 1)
@@ -116,7 +116,7 @@ def test_two_who_meet_in_a_corridor_of_one_s_width_both_get_through(tmp_path: Pa
     assert ends_at(stored, "guard") == (1.0, 1.5)
 
 
-def test_a_robot_caught_in_the_corridor_ends_the_deadlock_with_an_event(tmp_path: Path) -> None:
+def test_a_robot_caught_in_the_corridor_ends_the_deadlock_with_an_event(tmp_path):
     """The one without the right of way is hemmed in by a third: the other one has to back off."""
     robots = {
         "butler": robot([3.5, 1.5], [7.5, 1.5], 30.0, [1.0, 1.0], 900.0),
@@ -132,7 +132,7 @@ def test_a_robot_caught_in_the_corridor_ends_the_deadlock_with_an_event(tmp_path
         assert np.hypot(np.diff(way.x[-60:]), np.diff(way.y[-60:])).sum() < 0.5, "it has ended"
 
 
-def test_five_robots_queue_at_one_charger() -> None:
+def test_five_robots_queue_at_one_charger():
     battery = {"driving": "40 min", "standing": "3 h", "charging": "10 min", "charger": [1.0, 3.0]}
     dock = {"type": "dock", "threshold": "60 %", "until": "80 %"}
     one = {"battery": {**battery, "charge": "50 %"}, "camera": None, "behaviors": [dock, {"type": "patrol", "dwell": "30 s"}]}  # fmt: skip
@@ -143,7 +143,7 @@ def test_five_robots_queue_at_one_charger() -> None:
     assert charged == set(robots)
 
 
-def test_a_person_asleep_before_the_door_is_waited_for_and_the_stop_is_skipped(tmp_path: Path) -> None:  # fmt: skip
+def test_a_person_asleep_before_the_door_is_waited_for_and_the_stop_is_skipped(tmp_path):  # fmt: skip
     robots = {"butler": robot([1.0, 1.5], [10.0, 1.5], 60.0, [1.0, 2.5], 9000.0)}
     content = {**scenario("20 min", robots=robots, users={"ana": person([3.3, 1.5])}), "floorplan": corridor(tmp_path)}  # fmt: skip
     stored = assert_same_for_every_max_span(content, 61, 1)
@@ -151,7 +151,7 @@ def test_a_person_asleep_before_the_door_is_waited_for_and_the_stop_is_skipped(t
     assert [("gives_way", "butler", "ana"), ("gives_up", "butler", "ana")] == [row[1:] for row in told(stored, "gives_way", "gives_up")][:2]  # fmt: skip
 
 
-def test_a_robot_put_into_another_moves_out_of_it() -> None:
+def test_a_robot_put_into_another_moves_out_of_it():
     content = scenario(
         "3 min",
         robots={"butler": robot([1, 3]), "guard": robot([4, 1])},
@@ -163,7 +163,7 @@ def test_a_robot_put_into_another_moves_out_of_it() -> None:
     assert nearest(stored, "butler", "guard") < 0
 
 
-def test_a_robot_leaves_in_time_for_a_person_whose_life_stays_the_same() -> None:
+def test_a_robot_leaves_in_time_for_a_person_whose_life_stays_the_same():
     users = {"ana": person([0.6, 3], 20.0, [4.4, 3], 20.0, [0.6, 3], 20.0)}
     stored = assert_same_for_every_max_span(
         scenario("2 min", users=users, robots={"butler": robot([2.5, 3])}), 61, 1
@@ -175,7 +175,7 @@ def test_a_robot_leaves_in_time_for_a_person_whose_life_stays_the_same() -> None
     assert not told(stored, "overlaps")
 
 
-def test_what_a_log_forces_is_counted_and_told(tmp_path: Path) -> None:
+def test_what_a_log_forces_is_counted_and_told(tmp_path):
     log = tmp_path / "ana.csv"
     rows = [f"2026-01-05T07:00:{s:02},{3.0 if s < 30 else 1.0},3.0" for s in range(60)]
     log.write_text("time,x,y\n" + "\n".join(rows))
@@ -187,7 +187,7 @@ def test_what_a_log_forces_is_counted_and_told(tmp_path: Path) -> None:
     assert "robots.butler: ana walked into it 1 time" in stored.manifest["notes"]
 
 
-def test_who_yields_is_a_rule_that_can_be_replaced() -> None:
+def test_who_yields_is_a_rule_that_can_be_replaced():
     def yields(rule: Any) -> set[str]:
         battery = {"driving": "2 h", "standing": "10 h", "charging": "3 h", "charger": [1, 1]}
         robots = {
@@ -212,7 +212,7 @@ def yielding_of(simulation: fleet2d.Simulation) -> Yielding:
     return found
 
 
-def test_the_second_of_two_blocked_robots_does_not_swap_the_right_of_way_back() -> None:
+def test_the_second_of_two_blocked_robots_does_not_swap_the_right_of_way_back():
     """Each of two that blocked the other ended the deadlock, a second apart, and so none did."""
     robots = {"butler": robot([1, 3]), "guard": robot([4, 3])}
     yielding = yielding_of(fleet2d.Simulation(scenario("1 min", robots=robots)))
@@ -224,7 +224,7 @@ def test_the_second_of_two_blocked_robots_does_not_swap_the_right_of_way_back() 
     assert (yielding._first_now(10) == before).all()
 
 
-def test_who_goes_first_drives_round_another_one_that_stands() -> None:
+def test_who_goes_first_drives_round_another_one_that_stands():
     """It stopped before it every two seconds, until the deadlock was ended."""
     robots = {"butler": robot([1, 3], [4, 3], 60.0), "guard": robot([2, 3])}
     simulation = fleet2d.Simulation(scenario("1 min", robots=robots))
@@ -282,7 +282,7 @@ def random_scenario(number: int) -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", sorted({*some(range(300), 25), 100, 107}))
-def test_in_random_homes_robots_overlap_with_nobody_who_does_not_walk_into_them(number: int) -> None:  # fmt: skip
+def test_in_random_homes_robots_overlap_with_nobody_who_does_not_walk_into_them(number):  # fmt: skip
     content = random_scenario(number)
     stored = run(content)
     robots, users = content["robots"], content["users"]
@@ -306,7 +306,7 @@ def test_in_random_homes_robots_overlap_with_nobody_who_does_not_walk_into_them(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", some(range(300, 340), 8))
-def test_in_random_homes_every_robot_reaches_a_goal_or_says_why_not(number: int) -> None:
+def test_in_random_homes_every_robot_reaches_a_goal_or_says_why_not(number):
     content = random_scenario(number)
     for one in content["robots"].values():
         one["behaviors"] = [{"type": "patrol", "dwell": "5 s"}]

@@ -51,18 +51,18 @@ BODIES = {
 
 
 @pytest.fixture(scope="module")
-def whole() -> Run:
+def whole():
     """Two hours with every behavior."""
     return run(everything())
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_a_body_keeps_its_radius_speed_and_turn_rate(whole: Run, name: str) -> None:
+def test_a_body_keeps_its_radius_speed_and_turn_rate(whole, name):
     check_body(whole, name, *BODIES[name])
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_no_move_crosses_a_wall_between_two_steps(whole: Run, name: str) -> None:
+def test_no_move_crosses_a_wall_between_two_steps(whole, name):
     # At a tenth of a second, a body that goes round a corner between two steps hugs it.
     content = everything("20 min")
     content["simulation"]["step"] = "100 ms"
@@ -74,14 +74,14 @@ def test_no_move_crosses_a_wall_between_two_steps(whole: Run, name: str) -> None
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.3, 0.44])
-def test_wide_and_narrow_bodies_keep_their_radius(radius: float) -> None:
+def test_wide_and_narrow_bodies_keep_their_radius(radius):
     robot = {"type": "patrol", "radius": radius, "dwell": 0, "order": "random", "speed": 2}
     stored = run(scenario("1 h", robots={"astro": robot}))
     check_body(stored, "astro", radius, 2, 90)
     assert len(set(path(stored, "astro").room.tolist())) >= 4
 
 
-def test_who_stands_where_a_walk_was_broken_off_can_go_on() -> None:
+def test_who_stands_where_a_walk_was_broken_off_can_go_on():
     """Interrupted at any step, also at a corner of the space: there is always a way."""
     scripts: Any = [f"{room}" for room in ("kitchen", "bedroom", "bathroom", "living_room") * 20]
     behaviors = [{"type": f"{OWN}:Scripted", "script": scripts}]
@@ -89,7 +89,7 @@ def test_who_stands_where_a_walk_was_broken_off_can_go_on() -> None:
     check_body(stored, "ana", 0.2, 1.0, 180)
 
 
-def test_a_body_too_wide_for_the_home_is_refused() -> None:
+def test_a_body_too_wide_for_the_home_is_refused():
     with pytest.raises(fleet2d.Fleet2DError, match="radius") as caught:
         fleet2d.Simulation(scenario(users={"ana": {"radius": 2}}))
     assert "2 m" in str(caught.value)

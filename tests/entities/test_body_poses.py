@@ -38,14 +38,12 @@ def bodies_at(*xs: int) -> Bodies:
     ("actors", "capacity"),
     [(0, 1 << 16), (1, 1 << 16), (32, 1 << 16), (64, 1 << 15), (10**4, 1 << 12)],
 )
-def test_watchers_take_in_fewer_steps_the_more_bodies_there_are_but_never_few(
-    actors: int, capacity: int
-) -> None:
+def test_watchers_take_in_fewer_steps_the_more_bodies_there_are_but_never_few(actors, capacity):
     assert capacity == state.capacity_of(actors)
     assert state.MIN_STEPS <= capacity <= state.MAX_STEPS
 
 
-def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step() -> None:
+def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step():
     bodies = bodies_at(5, 7, 9)
     bodies.follow(1, *planned((0, 7), (4, 11)))
     block = bodies.block(1, 6)
@@ -56,11 +54,11 @@ def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step() -> None:
     assert [[5, 0, 0, 0], [10, 0, 0, 0], [9, 0, 0, 0]] == bodies.poses(np.array([2, 3]))[1].tolist()
 
 
-def test_a_block_of_nobody_has_no_rows() -> None:
+def test_a_block_of_nobody_has_no_rows():
     assert (0, 4) == Bodies(0, 0, SECOND).block(0, 4).x.shape
 
 
-def test_a_plan_holds_from_the_present_step_on() -> None:
+def test_a_plan_holds_from_the_present_step_on():
     bodies = bodies_at(5, 7)
     bodies.step = 3
     assert [7] * 6 == bodies.block(0, 6).x[1].tolist()
@@ -71,7 +69,7 @@ def test_a_plan_holds_from_the_present_step_on() -> None:
     assert Pose(1, 2, 3, 1) == bodies.pose_at(1, bodies.step)
 
 
-def test_postures_are_taken_and_forgotten_when_a_plan_has_none() -> None:
+def test_postures_are_taken_and_forgotten_when_a_plan_has_none():
     bodies = bodies_at(5)
     bodies.step = 10
     bodies.follow(0, *planned((10, 5), posture=0, postures=((12, 2),)))
@@ -81,7 +79,7 @@ def test_postures_are_taken_and_forgotten_when_a_plan_has_none() -> None:
     assert [2, 0, 0, 0] == bodies.block(13, 17).posture[0].tolist()
 
 
-def test_who_is_due_is_whose_step_has_come() -> None:
+def test_who_is_due_is_whose_step_has_come():
     bodies = bodies_at(5, 7, 9)
     assert [0, 1, 2] == bodies.due(0)
     bodies.ask_at[:] = 30, NEVER, 20
@@ -92,7 +90,7 @@ def test_who_is_due_is_whose_step_has_come() -> None:
     assert NEVER == Bodies(0, 0, SECOND).next_decision()
 
 
-def test_bodies_are_written_without_what_follows_and_read_the_same() -> None:
+def test_bodies_are_written_without_what_follows_and_read_the_same():
     bodies = bodies_at(5, 7)
     bodies.follow(1, *planned((0, 7), (400, 5000)))
     small = len(pickle.dumps(bodies))
@@ -105,7 +103,7 @@ def test_bodies_are_written_without_what_follows_and_read_the_same() -> None:
     )  # fmt: skip
 
 
-def test_what_is_forgotten_is_no_longer_told() -> None:
+def test_what_is_forgotten_is_no_longer_told():
     bodies = bodies_at(5, 7)
     bodies.step = 4
     bodies.follow(1, *planned((4, 20)))

@@ -13,7 +13,6 @@ from fleet2d import Behavior, Plan, Situation
 from fleet2d.entities.behavior import holds, parse_span
 from fleet2d.errors import InputError
 from fleet2d.interventions import Put, Release, Replan, Send
-from fleet2d.interventions.intervention import Intervention
 
 OWN = __name__
 
@@ -81,24 +80,24 @@ def noted(content: dict[str, Any], *spans: int) -> list[tuple[str, str]]:
     return [(name, detail) for _, name, detail in events(stored)]
 
 
-def test_the_first_breaks_in_on_those_behind_it_when_it_said() -> None:
+def test_the_first_breaks_in_on_those_behind_it_when_it_said():
     rows = noted(home_with([errand(5, 20), IDLE], "30 min", QUIET), 61, 1)
     assert [("idle", "0"), ("errand", "300")] == rows[:2]
     assert ("errand", "1200") in rows
 
 
-def test_who_is_behind_or_may_not_break_in_waits() -> None:
+def test_who_is_behind_or_may_not_break_in_waits():
     assert [("idle", "0")] == noted(home_with([IDLE, errand(5)], "30 min", QUIET))
     assert [("idle", "0")] == noted(home_with([errand(5, preempts=False), IDLE], "30 min", QUIET))
 
 
-def test_who_has_nothing_to_do_after_all_leaves_no_trace() -> None:
+def test_who_has_nothing_to_do_after_all_leaves_no_trace():
     alone = run(home_with(["patrol"], "30 min", QUIET))
     with_errand = run(home_with([errand(*range(1, 30), declines=True), "patrol"], "30 min", QUIET))
     assert digests(alone) == digests(with_errand)
 
 
-def test_only_the_round_that_resumes_goes_on_where_it_was() -> None:
+def test_only_the_round_that_resumes_goes_on_where_it_was():
     def stops(kind: str) -> list[str]:
         content = home_with([errand(7), {"type": f"{OWN}:{kind}"}], "30 min", QUIET)
         return [detail for name, detail in noted(content) if name in ("at", "errand")]
@@ -107,7 +106,7 @@ def test_only_the_round_that_resumes_goes_on_where_it_was() -> None:
     assert ["bedroom", "bathroom", "420", "bedroom", "bathroom"] == stops("Round")[:5]
 
 
-def test_a_stop_that_was_broken_off_is_made_up_for() -> None:
+def test_a_stop_that_was_broken_off_is_made_up_for():
     content = home_with([errand(7), {"type": f"{OWN}:SteadyRound"}], "30 min", QUIET)
     rows = [(detail, step) for step, _, detail in events(run(content))]
     begun = dict(reversed(rows))  # the first of each
@@ -115,7 +114,7 @@ def test_a_stop_that_was_broken_off_is_made_up_for() -> None:
     assert 120 < begun["living_room"] - begun["bathroom"] - 300 < 200
 
 
-def test_hours_begin_and_end_a_behavior() -> None:
+def test_hours_begin_and_end_a_behavior():
     patrol = {"type": "patrol", "waypoints": [[7.0, 1.0]], "dwell": "1 h", "when": "07:10-07:20"}
     stored = assert_same_for_every_max_span(home_with([patrol, IDLE], "30 min", QUIET), 61, 1)
     assert ["idle", "idle"] == [name for _, name, _ in events(stored)]
@@ -123,11 +122,11 @@ def test_hours_begin_and_end_a_behavior() -> None:
     assert ["living_room_1", "kitchen_1"] == rooms(stored)
 
 
-def test_outside_its_hours_a_behavior_is_not_asked() -> None:
+def test_outside_its_hours_a_behavior_is_not_asked():
     assert [] == noted(home_with([{**IDLE, "when": "08:00-09:00"}], "30 min", QUIET))
 
 
-def test_a_cooldown_begins_when_its_turn_is_over() -> None:
+def test_a_cooldown_begins_when_its_turn_is_over():
     content = home_with([{**errand(*range(60)), "cooldown": "10 min"}, IDLE], "40 min", QUIET)
     steps = [int(detail) for name, detail in noted(content) if name == "errand"]
     assert len(steps) >= 3
@@ -135,7 +134,7 @@ def test_a_cooldown_begins_when_its_turn_is_over() -> None:
     assert all(b - a < 800 for a, b in pairwise(steps))
 
 
-def test_copies_made_while_something_is_broken_off_live_the_same_future() -> None:
+def test_copies_made_while_something_is_broken_off_live_the_same_future():
     import copy
 
     content = home_with([errand(7), {"type": f"{OWN}:SteadyRound"}], "30 min", QUIET)
@@ -145,7 +144,7 @@ def test_copies_made_while_something_is_broken_off_live_the_same_future() -> Non
     assert digests(run(content)) == digests(branch.run()) == digests(simulation.run())
 
 
-def test_replanning_asks_everybody_anew() -> None:
+def test_replanning_asks_everybody_anew():
     simulation = fleet2d.Simulation(home_with([errand(5), IDLE], "10 min", QUIET))
     simulation.advance(60)
     simulation.do(Replan("astro"))
@@ -156,7 +155,7 @@ def test_replanning_asks_everybody_anew() -> None:
 @pytest.mark.parametrize(
     "act", [Put("astro", "bedroom"), Send("astro", "kitchen"), Release("astro"), Replan("astro")]
 )
-def test_who_is_put_elsewhere_or_ordered_decides_at_once(act: Intervention) -> None:
+def test_who_is_put_elsewhere_or_ordered_decides_at_once(act):
     simulation = fleet2d.Simulation(home_with([IDLE], "10 min", QUIET))
     simulation.advance(60)
     simulation.do(act)
@@ -175,9 +174,7 @@ MONDAY = datetime(2026, 1, 5)
         ("saturday,sunday 0:00-24:00", [5 * 24, 6 * 24 + 23.9], [0, 4 * 24 + 23.9]),
     ],
 )
-def test_hours_hold_when_they_say(
-    text: str, holding: list[float], not_holding: list[float]
-) -> None:
+def test_hours_hold_when_they_say(text, holding, not_holding):
     span = parse_span(text)
     for hour in holding:
         assert span.end_at(MONDAY + timedelta(hours=hour)) is not None, hour
@@ -185,7 +182,7 @@ def test_hours_hold_when_they_say(
         assert span.end_at(MONDAY + timedelta(hours=hour)) is None, hour
 
 
-def test_the_next_begin_is_after_the_moment() -> None:
+def test_the_next_begin_is_after_the_moment():
     span = parse_span("weekend 10:00-12:00")
     assert datetime(2026, 1, 10, 10) == span.next_begin(MONDAY)
     assert datetime(2026, 1, 11, 10) == span.next_begin(datetime(2026, 1, 10, 10))
@@ -203,12 +200,12 @@ def test_the_next_begin_is_after_the_moment() -> None:
         ([7], "expected hours"),
     ],
 )
-def test_hours_that_can_not_be_read_are_refused(when: Any, words: str) -> None:
+def test_hours_that_can_not_be_read_are_refused(when, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(home_with([{**IDLE, "when": when}]))
 
 
-def test_hours_and_the_rest_are_written_back_as_they_were() -> None:
+def test_hours_and_the_rest_are_written_back_as_they_were():
     content = home_with([{"type": "patrol", "when": ["weekend 8:00-9:30"], "cooldown": "5 min"}])
     scenario = fleet2d.load_scenario(content)
     again = fleet2d.load_scenario(scenario.model_dump(mode="json"))

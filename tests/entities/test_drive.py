@@ -2,7 +2,6 @@
 
 import copy
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -101,8 +100,8 @@ def busy(drive: Any) -> dict[str, Any]:
 @pytest.mark.slow
 @pytest.mark.parametrize("drive", some(list(OTHERS), 2))
 def test_a_run_is_the_same_for_every_span_and_continues_from_a_copy_and_from_a_file(
-    drive: str, tmp_path: Path
-) -> None:
+    drive, tmp_path
+):
     content = busy(drive)
     whole = assert_same_for_every_max_span(content, 600, 7, 1)
     kinds = {name for _, name, _ in events(whole)}
@@ -121,7 +120,7 @@ def test_a_run_is_the_same_for_every_span_and_continues_from_a_copy_and_from_a_f
 
 
 @pytest.mark.parametrize("drive", OTHERS)
-def test_a_robot_stays_on_its_routes(drive: str) -> None:
+def test_a_robot_stays_on_its_routes(drive):
     """It is where the usual drive would be, only at another time."""
     content = home_with([{"type": "patrol", "dwell": "10 s"}], "10 min")
     usual, other = (
@@ -133,12 +132,12 @@ def test_a_robot_stays_on_its_routes(drive: str) -> None:
         assert np.hypot(*(places - (x, y)).T).min() < 0.31  # the way of half a second
 
 
-def test_a_drive_of_ones_own_passes_corners_that_it_does_not_mention() -> None:
+def test_a_drive_of_ones_own_passes_corners_that_it_does_not_mention():
     assert [(0.6, 3.0, 0.0), (1.0, 3.0, 2.0)] == [row[:3] for row in driven(Flight())]
     assert [54.0, 90.0] == pytest.approx([row[3] for row in driven(Flight())], abs=0.1)
 
 
-def test_a_drive_of_ones_own_in_a_file_beside_the_scenario(tmp_path: Path) -> None:
+def test_a_drive_of_ones_own_in_a_file_beside_the_scenario(tmp_path):
     (tmp_path / "mine.py").write_text(
         "from fleet2d import Drive, Moment, Route\n"
         "class Slow(Drive):\n"
@@ -170,7 +169,7 @@ def test_a_drive_of_ones_own_in_a_file_beside_the_scenario(tmp_path: Path) -> No
     ],
     ids=["too short", "nothing", "back in time", "back", "too far", "nan", "years", "half"],
 )
-def test_nonsense_is_refused(moments: Any, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nonsense_is_refused(moments, words, monkeypatch):
     monkeypatch.setattr(Returned, "moments_of_test", moments)
     with pytest.raises(ComponentError) as caught:
         driven(Returned(), CORNER)
@@ -187,7 +186,7 @@ class Hopes(Returned):
 
 
 @pytest.mark.parametrize("seconds", [2.0, [1.0], [-1.0, 1.0], [float("nan"), 0.0]])
-def test_estimates_that_are_no_times_are_refused(seconds: Any) -> None:
+def test_estimates_that_are_no_times_are_refused(seconds):
     drive = Hopes.model_construct(estimate=seconds)
     with pytest.raises(ComponentError, match=r"Hopes estimated .* of shape \(2,\)"):
         estimate(drive, np.array([1.0, 2.0]), 0.6)
@@ -200,9 +199,7 @@ def test_estimates_that_are_no_times_are_refused(seconds: Any) -> None:
         (KeyError("wheel"), "KeyError: 'wheel'"),
     ],
 )
-def test_errors_name_robot_drive_and_step(
-    moments: Any, words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_errors_name_robot_drive_and_step(moments, words, monkeypatch):
     monkeypatch.setattr(Returned, "moments_of_test", moments)
     with pytest.raises(ComponentError) as caught:
         run(home_with([GO], "1 min", astro={"drive": Returned()}))
@@ -210,7 +207,7 @@ def test_errors_name_robot_drive_and_step(
     assert words in str(caught.value)
 
 
-def test_robots_think_that_a_way_takes_what_their_drive_takes() -> None:
+def test_robots_think_that_a_way_takes_what_their_drive_takes():
     times = {}
     for drive in ("differential", "holonomic", "trapezoidal"):
         simulation = fleet2d.Simulation(home_with([], "1 min", astro={"drive": drive}))
@@ -226,7 +223,7 @@ def test_robots_think_that_a_way_takes_what_their_drive_takes() -> None:
     )
 
 
-def test_another_type_in_an_override_replaces_the_keys_of_the_old_one() -> None:
+def test_another_type_in_an_override_replaces_the_keys_of_the_old_one():
     base = {"robots": {"astro": {"drive": {"type": "trapezoidal", "acceleration": 0.2}}}}
 
     def drive(*overrides: str) -> Any:
@@ -237,13 +234,13 @@ def test_another_type_in_an_override_replaces_the_keys_of_the_old_one() -> None:
     assert {"type": "trapezoidal", "acceleration": 1} == drive("robots.astro.drive.acceleration=1")
 
 
-def test_an_unknown_drive_is_refused_with_the_names_of_all() -> None:
+def test_an_unknown_drive_is_refused_with_the_names_of_all():
     with pytest.raises(ScenarioError) as caught:
         fleet2d.load_scenario("bundled:paper", "robots.astro.drive=holonomc")
     assert "did you mean 'holonomic'" in str(caught.value)
 
 
-def test_people_have_no_drive() -> None:
+def test_people_have_no_drive():
     with pytest.raises(ScenarioError) as caught:
         fleet2d.load_scenario("bundled:paper", "users.ana.drive=holonomic")
     assert "drive" in str(caught.value)
@@ -252,7 +249,7 @@ def test_people_have_no_drive() -> None:
 POINTS = st.lists(st.tuples(*[st.integers(-5000, 5000)] * 2), min_size=1, max_size=6)
 
 
-def test_it_turns_on_the_spot_and_then_drives() -> None:
+def test_it_turns_on_the_spot_and_then_drives():
     assert [
         (6.0, 3.0, 0.0, 0.0),
         (7.0, 3.0, 0.0, 90.0),
@@ -261,9 +258,7 @@ def test_it_turns_on_the_spot_and_then_drives() -> None:
 
 
 @given(POINTS, st.integers(0, TURN - 1), st.floats(1, 5000), st.floats(1, TURN))
-def test_it_is_the_same_as_in_the_core(
-    points: list[tuple[int, int]], heading: int, speed: float, turn_rate: float
-) -> None:
+def test_it_is_the_same_as_in_the_core(points, heading, speed, turn_rate):
     route = np.array(points, np.int64)
     core = time_route(route, 0, heading, speed, turn_rate)[1:]
     rows = breakpoints(Differential(), route, heading, (speed, turn_rate), 1280.0)
@@ -273,7 +268,7 @@ def test_it_is_the_same_as_in_the_core(
     assert ((late >= -1) & (late <= 1 + np.arange(len(late)))).all()
 
 
-def test_it_turns_while_it_drives() -> None:
+def test_it_turns_while_it_drives():
     assert [
         (6.0, 3.0, 0.0, 0.0),
         (7.0, 3.0, 0.5, 90.0),  # a quarter turn takes a second, half a metre
@@ -281,14 +276,14 @@ def test_it_turns_while_it_drives() -> None:
     ] == driven(Holonomic())
 
 
-def test_it_turns_the_shorter_way_as_far_as_the_way_lasts() -> None:
+def test_it_turns_the_shorter_way_as_far_as_the_way_lasts():
     assert [(0.5, 0.25, 0.0, 315.0)] == driven(Holonomic(), [(0, 0), (0.25, 0)], heading_deg=270)
     assert [(0.5, 0.0, 0.25, 45.0), (1.0, 0.0, 0.5, 90.0)] == driven(
         Holonomic(), [(0, 0), (0, 0.25), (0, 0.5)]
     )
 
 
-def test_it_keeps_its_heading_if_it_never_turns() -> None:
+def test_it_keeps_its_heading_if_it_never_turns():
     assert [(6.0, 3.0, 0.0, 45.0), (10.0, 3.0, 2.0, 45.0)] == driven(
         Holonomic(turns=False), heading_deg=45
     )
@@ -300,7 +295,7 @@ def along(acceleration: float, metres: float, pieces: int = 64) -> np.ndarray:
     return np.array([(0, 0), *((s, x) for s, x, _, _ in driven(drive, [(0, 0), (metres, 0)]))])
 
 
-def test_it_takes_speed_by_acceleration_longer_for_each_leg() -> None:
+def test_it_takes_speed_by_acceleration_longer_for_each_leg():
     rows = driven(Trapezoidal(acceleration=0.25, pieces=2))
 
     assert (
@@ -317,14 +312,14 @@ def test_it_takes_speed_by_acceleration_longer_for_each_leg() -> None:
     assert (15.0, 3.0, 2.0, 90.0) == rows[-1]  # 2 m / 0.5 m/s + 2 s
 
 
-def test_on_a_short_leg_it_brakes_before_it_is_at_full_speed() -> None:
+def test_on_a_short_leg_it_brakes_before_it_is_at_full_speed():
     rows = along(0.25, 0.36, pieces=2)
 
     assert [[0, 0], [0.6, 0.045], [1.2, 0.18], [1.8, 0.315], [2.4, 0.36]] == rows.tolist()
 
 
 @pytest.mark.parametrize("metres", [0.01, 0.05, 1.0, 7.5])
-def test_positions_and_speeds_are_those_of_the_profile(metres: float) -> None:
+def test_positions_and_speeds_are_those_of_the_profile(metres):
     time, x = along(0.5, metres, pieces=8).T
 
     ramp, left = min(0.5, metres) / 2, time[-1] - time
@@ -338,7 +333,7 @@ def test_positions_and_speeds_are_those_of_the_profile(metres: float) -> None:
     assert (np.diff(x) <= 0.5 * np.diff(time) + 0.002).all()
 
 
-def test_it_thinks_that_ways_take_what_they_take() -> None:
+def test_it_thinks_that_ways_take_what_they_take():
     drive = Trapezoidal(acceleration=0.3)
     metres = np.array([0.0, 0.2, 0.8, 0.9, 5.0, np.inf])
     taken = [0.0, *(driven(drive, [(0, 0), (way, 0)])[-1][0] for way in metres[1:-1]), np.inf]

@@ -66,7 +66,7 @@ def slow_offset(settings: Localization, step: int, units: float = 1280) -> tuple
     return offset[0], offset[1], turn
 
 
-def test_the_error_is_that_of_its_slow_twin() -> None:
+def test_the_error_is_that_of_its_slow_twin():
     settings = Localization.model_validate(WRONG)
     drift = Drift(settings, 1280, 10**6, 4, "robots.astro")
     steps = np.array([0, 1, 100, 239, 240, 241, 3600, 86_399, 10**7, 17])
@@ -75,7 +75,7 @@ def test_the_error_is_that_of_its_slow_twin() -> None:
     assert slow == list(zip(*(column.tolist() for column in fast), strict=True))
 
 
-def test_points_are_put_where_its_slow_twin_puts_them() -> None:
+def test_points_are_put_where_its_slow_twin_puts_them():
     settings = Localization.model_validate(WRONG)
     drift = Drift(settings, 1280, 10**6, 4, "robots.astro")
     steps = np.arange(0, 5000, 97)
@@ -93,7 +93,7 @@ def test_points_are_put_where_its_slow_twin_puts_them() -> None:
         ]
 
 
-def test_errors_spread_as_configured() -> None:
+def test_errors_spread_as_configured():
     settings = Localization(drift="10 cm", corrected_every="2 min", left="3 cm")  # type: ignore[arg-type]
     drift = Drift(settings, 1280, 10**6, 4, "me")
     begins = np.arange(4000) * 120
@@ -105,14 +105,14 @@ def test_errors_spread_as_configured() -> None:
     assert abs(np.corrcoef(after.x, after.y)[0, 1]) < 0.06
 
 
-def test_jumps_are_as_frequent_as_configured() -> None:
+def test_jumps_are_as_frequent_as_configured():
     settings = Localization(jump="1 m", jumps_per_hour=3, corrected_every="10 min")  # type: ignore[arg-type]
     drift = Drift(settings, 1280, 10**6, 4, "me")
     ends = drift.at(np.arange(3000) * 600 + 599)
     assert (ends.x != 0).mean() == pytest.approx(0.5, abs=0.03)
 
 
-def test_what_is_seen_is_off_as_the_robot_is() -> None:
+def test_what_is_seen_is_off_as_the_robot_is():
     stored = run(lost(left="40 cm", corrected_every="5 min"))
     rows = table(stored, "observations")
     assert len(rows["step"]) > 100
@@ -124,13 +124,13 @@ def test_what_is_seen_is_off_as_the_robot_is() -> None:
 
 
 @pytest.mark.parametrize("camera", [None, {"angle_deg": 360, "range": [0, 8], "latency": "7 s"}])
-def test_spans_do_not_show(camera: Any) -> None:
+def test_spans_do_not_show(camera):
     content = lost("20 min", camera, **WRONG)
     first, *others = (digests(run(content, max_span=span)) for span in (None, 61, 1))
     assert all(first == other for other in others)
 
 
-def test_nobody_moves_otherwise_and_off_is_as_if_it_were_not_there() -> None:
+def test_nobody_moves_otherwise_and_off_is_as_if_it_were_not_there():
     without, errs = run(lost()), run(lost(**WRONG))
     for name in ("ana", "astro"):
         assert np.array_equal(path(without, name).x, path(errs, name).x)
@@ -150,7 +150,7 @@ class Watch(Algorithm):
         return {"x": float(history.poses("astro").x[0])}
 
 
-def test_algorithms_are_told_where_the_robot_believes_to_be() -> None:
+def test_algorithms_are_told_where_the_robot_believes_to_be():
     content = lost(left="50 cm", corrected_every="10 min")
     content["algorithms"] = {"watch": {"type": f"{__file__}:Watch", "period": "10 min"}}
     stored = run(content)
@@ -169,6 +169,6 @@ def test_algorithms_are_told_where_the_robot_believes_to_be() -> None:
         ({"drifts": 1}, "Did you mean|did you mean|Allowed"),
     ],
 )
-def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+def test_bad_settings_are_refused(fields, words):
     with pytest.raises(InputError, match=words):
         fleet2d.load_scenario(lost(**fields))

@@ -29,14 +29,14 @@ def walk(content: dict[str, Any]) -> tuple[F64, F64]:
     return metres, np.rad2deg((np.diff(poses.heading) + np.pi) % (2 * np.pi) - np.pi)
 
 
-def test_a_step_is_as_long_as_the_speed_says_or_nothing() -> None:
+def test_a_step_is_as_long_as_the_speed_says_or_nothing():
     metres, _ = walk(walker(speed=0.8))
     free = metres > 0
     assert metres[free] == pytest.approx(0.8, abs=2e-3)
     assert 0.2 < free.mean() < 1
 
 
-def test_it_goes_where_it_heads() -> None:
+def test_it_goes_where_it_heads():
     poses = path(run(walker(speed=0.8)), "ben")
     dx, dy = np.diff(poses.x), np.diff(poses.y)
     moved = (dx != 0) | (dy != 0)
@@ -44,7 +44,7 @@ def test_it_goes_where_it_heads() -> None:
     assert ahead[moved] == pytest.approx(0.8, abs=2e-3)
 
 
-def test_turns_have_the_standard_deviation_asked_for() -> None:
+def test_turns_have_the_standard_deviation_asked_for():
     # At small steps, so that few are cut short by a wall and the choice of those is no bias.
     metres, turns = walk(walker("2 h", speed=0.02, turn_std_deg=20, turn_rate_deg=3600))
     assert (metres > 0).mean() > 0.9
@@ -53,39 +53,39 @@ def test_turns_have_the_standard_deviation_asked_for() -> None:
     assert abs(turns.mean()) < 1
 
 
-def test_the_spread_does_not_depend_on_the_step() -> None:
+def test_the_spread_does_not_depend_on_the_step():
     content = walker("2 h", "250 ms", speed=0.02, turn_std_deg=20, turn_rate_deg=3600)
     metres, turns = walk(content)
     assert turns[metres > 0].std() == pytest.approx(20 * 0.5, rel=0.04)
 
 
-def test_turns_keep_to_the_turn_rate_also_at_walls() -> None:
+def test_turns_keep_to_the_turn_rate_also_at_walls():
     metres, turns = walk(walker(turn_std_deg=90, turn_rate_deg=30))
     for kind in (metres > 0, metres == 0):
         assert np.abs(turns[kind]).max() <= 30
         assert np.abs(turns[kind]).max() > 28
 
 
-def test_at_a_wall_it_turns_by_any_angle() -> None:
+def test_at_a_wall_it_turns_by_any_angle():
     metres, turns = walk(walker("8 h", turn_std_deg=5, turn_rate_deg=3600))
     blocked = turns[metres == 0]
     assert len(blocked) > 1000
     assert np.histogram(blocked, bins=4, range=(-180, 180))[0].min() > 0.2 * len(blocked)
 
 
-def test_without_spread_it_walks_straight_on_to_the_next_wall() -> None:
+def test_without_spread_it_walks_straight_on_to_the_next_wall():
     metres, turns = walk(walker(turn_std_deg=0))
     assert not turns[metres > 0].any()
     assert turns[metres == 0].any()
 
 
-def test_it_gets_everywhere() -> None:
+def test_it_gets_everywhere():
     poses = path(run(walker("8 h")), "ben")
     assert {0, 1, 2, 3} <= set(poses.room.tolist())
     assert 4 not in poses.room
 
 
-def test_it_goes_on_from_where_another_behavior_left_it() -> None:
+def test_it_goes_on_from_where_another_behavior_left_it():
     content = walker()
     content["users"]["ben"] = {
         "behaviors": [
@@ -102,7 +102,7 @@ def test_it_goes_on_from_where_another_behavior_left_it() -> None:
     assert moves.max() < 1.01
 
 
-def test_who_stays_at_walls_walks_less_and_is_near_them_for_most_of_the_time() -> None:
+def test_who_stays_at_walls_walks_less_and_is_near_them_for_most_of_the_time():
     """The published rule: 2,915 m a day and 75 % of the time within 0.3 m of a wall there."""
     metres, near = {}, {}
     for rule in ("turn", "stay"):
@@ -117,7 +117,7 @@ def test_who_stays_at_walls_walks_less_and_is_near_them_for_most_of_the_time() -
     assert near["stay"] > near["turn"]
 
 
-def test_who_sat_stands_for_as_long_as_it_walks() -> None:
+def test_who_sat_stands_for_as_long_as_it_walks():
     """The walk's plan said that it sat, so whatever followed the walk began sitting."""
     ana = {"behaviors": [{"type": f"{OWN}:Lounge"}, {"type": "meander"}]}
     furnished = {"type": "bundled", "furnish": True}

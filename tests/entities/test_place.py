@@ -37,13 +37,13 @@ def room_of(body: Actor, point: tuple[int, int]) -> str:
         ((7, 6), "bathroom_1"),
     ],
 )
-def test_a_place_is_the_first_that_there_is(place: Any, room: str) -> None:
+def test_a_place_is_the_first_that_there_is(place, room):
     body = actor()
     for moment in range(0, 10**8, 10**7):
         assert room == room_of(body, body.find(place, moment, "spot"))
 
 
-def test_a_body_has_one_room_of_a_kind_however_it_is_listed() -> None:
+def test_a_body_has_one_room_of_a_kind_however_it_is_listed():
     home = {"type": "bundled"}  # with three bedrooms
     for seed in range(6):
         body = actor(seed, home, start="any")
@@ -57,19 +57,19 @@ def test_a_body_has_one_room_of_a_kind_however_it_is_listed() -> None:
     assert len(rooms) > 1
 
 
-def test_a_point_is_that_point_exactly() -> None:
+def test_a_point_is_that_point_exactly():
     body = actor()
     assert [7.0, 1.0] == body.home.plan.lattice.to_metres(body.find([7.0, 1.0], 0, "spot")).tolist()
 
 
-def test_any_is_every_room_that_can_be_reached() -> None:
+def test_any_is_every_room_that_can_be_reached():
     body = actor()
     rooms = {room_of(body, body.find(["attic", "any"], k, "spot")) for k in range(200)}
     assert {room.name for room in body.reachable_rooms()} == rooms
     assert "storage_1" not in rooms
 
 
-def test_spots_fill_the_room_and_keep_the_radius_from_walls() -> None:
+def test_spots_fill_the_room_and_keep_the_radius_from_walls():
     body = actor(radius=0.5, start="bedroom")  # too wide for the doors
     xy = [body.home.plan.lattice.to_metres(body.find("bedroom", k, "spot")) for k in range(500)]
     assert min(x for x, _ in xy) == pytest.approx(0.5, abs=0.2)
@@ -81,7 +81,7 @@ def test_spots_fill_the_room_and_keep_the_radius_from_walls() -> None:
 TWO_BEDROOMS = {"type": "bundled"}
 
 
-def test_of_several_rooms_of_a_kind_a_body_has_its_own() -> None:
+def test_of_several_rooms_of_a_kind_a_body_has_its_own():
     """The bundled home has two bathrooms at least; who lives there uses one of them."""
     kinds = [room.type for room in fleet2d.load_floorplan().rooms]
     kind = next(k for k in kinds if kinds.count(k) > 1)
@@ -94,7 +94,7 @@ def test_of_several_rooms_of_a_kind_a_body_has_its_own() -> None:
     assert len(own) > 1
 
 
-def test_the_same_moment_and_purpose_give_the_same_spot() -> None:
+def test_the_same_moment_and_purpose_give_the_same_spot():
     one, other = actor(), actor()
     assert one.find("kitchen", 5, "spot") == other.find("kitchen", 5, "spot")
     assert one.find("kitchen", 5, "spot") != one.find("kitchen", 6, "spot")
@@ -116,14 +116,14 @@ def test_the_same_moment_and_purpose_give_the_same_spot() -> None:
         ([2.4, 1.5], ["wall"]),  # in the pillar
     ],
 )
-def test_places_where_it_can_not_be_are_refused(place: Any, words: list[str]) -> None:
+def test_places_where_it_can_not_be_are_refused(place, words):
     with pytest.raises(PlacementError) as caught:
         actor().find(place, 0, "spot")
     for word in words:
         assert word in str(caught.value)
 
 
-def test_the_nearest_free_point_that_an_error_names_is_one_that_will_do() -> None:
+def test_the_nearest_free_point_that_an_error_names_is_one_that_will_do():
     body = actor()
     with pytest.raises(PlacementError) as caught:
         body.find([5.05, 1.0], 0, "spot")
@@ -136,7 +136,7 @@ OUT_OF_THIS_WORLD = [[float("nan"), 1.0], [1.0, float("inf")], [1e9, 1.0], [10**
 
 
 @pytest.mark.parametrize("place", [*NO_PLACES, *OUT_OF_THIS_WORLD])
-def test_what_is_no_place_is_refused(place: Any) -> None:
+def test_what_is_no_place_is_refused(place):
     with pytest.raises(InputError) as caught:
         fleet2d.load_scenario(scenario(users={"ana": {"start": place}}))
     assert "users.ana.start" in str(caught.value)
@@ -170,14 +170,12 @@ def user(**fields: Any) -> dict[str, Any]:
         (user(type="pet", rooms=["kitchen", "garage"]), "pet.rooms: left out"),
     ],
 )
-def test_a_kind_that_the_home_lacks_is_left_out_with_a_note(
-    content: dict[str, Any], note: str
-) -> None:
+def test_a_kind_that_the_home_lacks_is_left_out_with_a_note(content, note):
     assert note in notes(content)
     assert "garage" in notes(content)
 
 
-def test_a_kind_that_is_there_but_out_of_reach_is_left_out_too() -> None:
+def test_a_kind_that_is_there_but_out_of_reach_is_left_out_too():
     """Six of 1,103 homes refused the bundled scenario, for it avoids bathrooms."""
     content = robot({"type": "hangout", "no_stops_in": ["storage"]}, start="kitchen")
     assert "hangout.no_stops_in: left out" in notes(content)
@@ -195,28 +193,26 @@ def test_a_kind_that_is_there_but_out_of_reach_is_left_out_too() -> None:
         (user(type="room_sampling", shares={"garage": 1}), ["room_sampling.shares", "garage"]),
     ],
 )
-def test_a_single_thing_that_is_not_there_is_refused_with_its_key(
-    content: dict[str, Any], words: list[str]
-) -> None:
+def test_a_single_thing_that_is_not_there_is_refused_with_its_key(content, words):
     with pytest.raises(InputError) as failure:
         Simulation(content)
     assert all(word in str(failure.value) for word in ["astro" in content or "a", *words])
 
 
-def test_an_activity_without_a_room_becomes_rest() -> None:
+def test_an_activity_without_a_room_becomes_rest():
     own = {"pottery": {"rooms": ["garage"], "takes": "1 h"}}
     day = {"on": "daily", "wake": "06:30", "do": {"pottery": "07:30"}}
     persona = {"activities": own, "days": {"any_day": day}}
     assert "activities.pottery.rooms: left out" in notes(user(type="routine", persona=persona))
 
 
-def test_an_item_of_a_schedule_in_a_room_that_is_not_there_is_left_out() -> None:
+def test_an_item_of_a_schedule_in_a_room_that_is_not_there_is_left_out():
     items = [{"at": "08:00", "place": "garage"}, {"at": "09:00", "place": "kitchen"}]
     content = user(type="schedule", days=[{"items": items}])
     assert "schedule.days: left out" in notes(content)
 
 
-def test_furniture_is_a_place_wherever_a_place_goes() -> None:
+def test_furniture_is_a_place_wherever_a_place_goes():
     items = [{"at": "00:00", "place": "sofa", "dwell": "1 d"}]
     users = {"ana": {"type": "schedule", "days": [{"items": items}], "start": "kitchen"}}
     robots = {"astro": {"behaviors": [{"type": "patrol", "rooms": ["desk", "bedroom"]}],
@@ -231,7 +227,7 @@ def test_furniture_is_a_place_wherever_a_place_goes() -> None:
     assert sofa.name in set(events[events["event"] == "uses"]["detail"])
 
 
-def test_a_name_that_is_nearly_a_piece_of_furniture_gets_that_as_a_hint() -> None:
+def test_a_name_that_is_nearly_a_piece_of_furniture_gets_that_as_a_hint():
     content = {
         **user(type="schedule", days=[{"items": [{"at": "08:00", "place": "soffa"}]}]),
         **FLAT,
@@ -262,7 +258,7 @@ def metres_to(stored: Any, name: str) -> float:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_robot_goes_to_the_bed_in_which_a_person_sleeps(seed: int) -> None:
+def test_a_robot_goes_to_the_bed_in_which_a_person_sleeps(seed):
     content = bedside({"type": "routine", "persona": "works_outside"})
     content["simulation"]["seed"] = seed
     stored = run(content)
@@ -270,12 +266,12 @@ def test_a_robot_goes_to_the_bed_in_which_a_person_sleeps(seed: int) -> None:
     assert metres_to(stored, "ana") < 2
 
 
-def test_a_schedule_lies_in_the_bed_that_a_robot_goes_to() -> None:
+def test_a_schedule_lies_in_the_bed_that_a_robot_goes_to():
     ana = {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": "bed"}]}]}
     assert metres_to(run(bedside(ana)), "ana") < 2
 
 
-def test_somebody_goes_to_the_bed_of_who_comes_later_in_the_scenario() -> None:
+def test_somebody_goes_to_the_bed_of_who_comes_later_in_the_scenario():
     ana = {"type": "schedule", "days": [{"items": [{"at": "02:03", "place": "bed of ben"}]}]}
     content = bedside(ana)
     del content["robots"]
@@ -286,7 +282,7 @@ def test_somebody_goes_to_the_bed_of_who_comes_later_in_the_scenario() -> None:
     assert digests(run(content))["events"] == digests(run(content, max_span=61))["events"]
 
 
-def test_it_is_written_as_it_was() -> None:
+def test_it_is_written_as_it_was():
     loaded = fleet2d.load_scenario(bedside({"type": "routine"}))
     assert loaded.robots["astro"].behaviors[0].visits[0].place == ("bed of ana",)  # type: ignore[attr-defined]
 
@@ -299,6 +295,6 @@ def test_it_is_written_as_it_was() -> None:
         ({"object": "bed"}, "expected a place"),
     ],
 )
-def test_what_is_not_there_is_refused_with_the_nearest_name(place: Any, words: str) -> None:
+def test_what_is_not_there_is_refused_with_the_nearest_name(place, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(bedside({"type": "routine"}, place))

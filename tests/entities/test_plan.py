@@ -65,14 +65,14 @@ def minute(now: Situation) -> Plan:
 # --- Legs --------------------------------------------------------------------------------------
 
 
-def test_a_turn_takes_the_long_way_if_told_to() -> None:
+def test_a_turn_takes_the_long_way_if_told_to():
     poses = path(run(lambda now: now.plan().turn_by(-1.5).stay(), turn_rate_deg=18), "ana")
     turned = np.unwrap(poses.heading)
     assert turned[:31] == pytest.approx(np.linspace(0, -3 * np.pi, 31), abs=0.01)
     assert turned[32:] == pytest.approx(-3 * np.pi, abs=0.01)
 
 
-def test_staying_until_a_past_time_takes_no_time() -> None:
+def test_staying_until_a_past_time_takes_no_time():
     steps, decide = recording_steps(
         lambda now: now.plan().stay(until=now.time - timedelta(hours=1)).stay(timedelta(seconds=30))
     )
@@ -80,7 +80,7 @@ def test_staying_until_a_past_time_takes_no_time() -> None:
     assert list(range(0, 300, 30)) == steps
 
 
-def test_staying_until_a_time_ends_at_it() -> None:
+def test_staying_until_a_time_ends_at_it():
     when = datetime(2026, 1, 5, 7, 1, 40)
     steps, decide = recording_steps(
         lambda now: now.plan().stay(until=when) if now.time < when else now.plan().stay()
@@ -89,19 +89,19 @@ def test_staying_until_a_time_ends_at_it() -> None:
     assert [0, 100] == steps
 
 
-def test_a_plan_that_ends_between_two_steps_is_followed_up_at_the_next() -> None:
+def test_a_plan_that_ends_between_two_steps_is_followed_up_at_the_next():
     steps, decide = recording_steps(lambda now: now.plan().stay(timedelta(seconds=10.4)))
     run(decide, duration="1 min")
     assert [0, 11, 22, 33, 44, 55] == steps
 
 
-def test_a_plan_that_takes_no_time_is_asked_for_once_a_step() -> None:
+def test_a_plan_that_takes_no_time_is_asked_for_once_a_step():
     steps, decide = recording_steps(lambda now: now.plan())
     run(decide, duration="1 min")
     assert list(range(60)) == steps
 
 
-def test_a_plan_knows_the_time_up_to_which_it_is_made() -> None:
+def test_a_plan_knows_the_time_up_to_which_it_is_made():
     times = []
 
     def decide(now: Situation) -> Plan:
@@ -117,7 +117,7 @@ def test_a_plan_knows_the_time_up_to_which_it_is_made() -> None:
     ] == times
 
 
-def test_leaving_and_coming_home() -> None:
+def test_leaving_and_coming_home():
     def decide(now: Situation) -> Plan:
         plan = now.plan().leave_home().note("gone").stay(timedelta(seconds=60)).come_home()
         return plan.note("back").stay()
@@ -133,13 +133,13 @@ def test_leaving_and_coming_home() -> None:
     assert not away[back:].any()
 
 
-def test_leaving_twice_and_coming_home_at_home_do_nothing() -> None:
+def test_leaving_twice_and_coming_home_at_home_do_nothing():
     stored = run(lambda now: now.plan().come_home().leave_home().leave_home().stay())
     assert ["left_home"] == table(stored, "events")["event"].tolist()
 
 
 @pytest.mark.parametrize("leg", ["go_to", "go_to_point"])
-def test_who_is_away_comes_home_before_walking(leg: str) -> None:
+def test_who_is_away_comes_home_before_walking(leg):
     def decide(now: Situation) -> Plan:
         if not now.actor.state.away:
             return now.plan().leave_home().stay(timedelta(seconds=30))
@@ -156,7 +156,7 @@ def test_who_is_away_comes_home_before_walking(leg: str) -> None:
     assert stored.plan.room("kitchen_1").index == poses.room[-1]
 
 
-def test_notes_are_told_at_the_first_step_not_before_them() -> None:
+def test_notes_are_told_at_the_first_step_not_before_them():
     def decide(now: Situation) -> Plan:
         plan = now.plan().note("now").stay(timedelta(seconds=2.5)).note("later", "why")
         return (
@@ -175,7 +175,7 @@ def test_notes_are_told_at_the_first_step_not_before_them() -> None:
 # --- Who decides -------------------------------------------------------------------------------
 
 
-def test_the_first_behavior_with_a_plan_is_followed() -> None:
+def test_the_first_behavior_with_a_plan_is_followed():
     third, decide_third = recording_steps(minute)
     second, decide_second = recording_steps(lambda now: minute(now) if now.step >= 120 else None)
     first, decide_first = recording_steps(lambda now: minute(now) if now.step == 180 else None)
@@ -185,7 +185,7 @@ def test_the_first_behavior_with_a_plan_is_followed() -> None:
     assert [0, 60] == third
 
 
-def test_if_nobody_has_a_plan_it_stays_still_and_asks_again() -> None:
+def test_if_nobody_has_a_plan_it_stays_still_and_asks_again():
     steps, decide = recording_steps(lambda now: None)
     stored = run(decide)
     assert [0, 60, 120, 180, 240] == steps
@@ -193,13 +193,13 @@ def test_if_nobody_has_a_plan_it_stays_still_and_asks_again() -> None:
     assert 1 == len(set(zip(poses.x, poses.y, poses.heading, strict=True)))
 
 
-def test_without_behaviors_it_stays_still_for_good() -> None:
+def test_without_behaviors_it_stays_still_for_good():
     poses = path(run(), "ana")
     assert (1.0, 3.0) == (poses.x[0], poses.y[0])
     assert 1 == len(set(zip(poses.x, poses.y, poses.heading, strict=True)))
 
 
-def test_a_situation_tells_where_and_when_it_is() -> None:
+def test_a_situation_tells_where_and_when_it_is():
     situations: list[Any] = []
 
     def decide(now: Situation) -> Plan:
@@ -215,7 +215,7 @@ def test_a_situation_tells_where_and_when_it_is() -> None:
     assert datetime(2026, 1, 5, 7) + timedelta(seconds=situations[1][0]) == situations[1][1]
 
 
-def test_draws_depend_on_body_purpose_and_step_only() -> None:
+def test_draws_depend_on_body_purpose_and_step_only():
     drawn: dict[Any, float] = {}
 
     def decide(now: Situation) -> Plan:
@@ -258,7 +258,7 @@ def watched(decide: Decide, *others: Decide, **camera: Any) -> dict[str, Any]:
     return scenario("5 min", users={"ana": entity_with(leave)}, robots={"astro": robot})
 
 
-def test_events_that_a_plan_names_end_it_at_the_next_step() -> None:
+def test_events_that_a_plan_names_end_it_at_the_next_step():
     situations: list[Any] = []
 
     def decide(now: Situation) -> Plan:
@@ -276,14 +276,14 @@ def test_events_that_a_plan_names_end_it_at_the_next_step() -> None:
     assert events["step"][0] == 0
 
 
-def test_events_that_a_plan_does_not_name_leave_it_alone() -> None:
+def test_events_that_a_plan_does_not_name_leave_it_alone():
     steps, decide = recording_steps(lambda now: now.plan().interrupt_on("user_lost").stay())
     stored = fleet2d.run(watched(decide))
     lost = table(stored, "events", event="user_lost")["step"].tolist()
     assert [0, *(step + 1 for step in lost)] == steps
 
 
-def test_an_event_says_where_the_user_was_perceived_last() -> None:
+def test_an_event_says_where_the_user_was_perceived_last():
     events: list[Any] = []
 
     def decide(now: Situation) -> Plan:
@@ -299,7 +299,7 @@ def test_an_event_says_where_the_user_was_perceived_last() -> None:
     ]
 
 
-def test_a_user_counts_as_lost_when_not_noticed_for_so_long() -> None:
+def test_a_user_counts_as_lost_when_not_noticed_for_so_long():
     for patience in (5, 20):
         stored = fleet2d.run(watched(lambda now: now.plan().stay(), lost_after=f"{patience} s"))
         steps = table(stored, "observations")["step"]
@@ -308,7 +308,7 @@ def test_a_user_counts_as_lost_when_not_noticed_for_so_long() -> None:
         assert [steps[gap[0]] + patience] == lost
 
 
-def test_an_interrupted_body_goes_on_from_where_it_is() -> None:
+def test_an_interrupted_body_goes_on_from_where_it_is():
     def decide(now: Situation) -> Plan:
         plan = now.plan().interrupt_on("user_lost", "user_seen")
         return plan.go_to([1.0, 3.0] if now.events else [4.5, 0.6]).stay()
@@ -346,7 +346,7 @@ def returns_the_same_plan_again() -> Decide:
         (returns_the_same_plan_again(), ["begin here and now", "now.plan()"]),
     ],
 )
-def test_a_behavior_that_breaks_its_contract_is_named(decide: Decide, words: list[str]) -> None:
+def test_a_behavior_that_breaks_its_contract_is_named(decide, words):
     with pytest.raises(ComponentError) as caught:
         run(decide)
     assert not isinstance(caught.value, InputError)
@@ -354,7 +354,7 @@ def test_a_behavior_that_breaks_its_contract_is_named(decide: Decide, words: lis
         assert word in str(caught.value)
 
 
-def test_an_event_that_there_is_not_is_refused_with_those_there_are() -> None:
+def test_an_event_that_there_is_not_is_refused_with_those_there_are():
     decide = entity_with(lambda now: now.plan().interrupt_on("doorbell"))
     with pytest.raises(ComponentError) as caught:
         fleet2d.run(scenario(robots={"astro": decide}))
@@ -362,7 +362,7 @@ def test_an_event_that_there_is_not_is_refused_with_those_there_are() -> None:
         assert word in str(caught.value)
 
 
-def test_what_was_stored_before_a_failure_is_readable(tmp_path: Any) -> None:
+def test_what_was_stored_before_a_failure_is_readable(tmp_path):
     def decide(now: Situation) -> Plan:
         assert now.step < 120, "enough"
         return minute(now)
@@ -378,7 +378,7 @@ def test_what_was_stored_before_a_failure_is_readable(tmp_path: Any) -> None:
     assert [0, 60] == table(stored, "trajectories")["step"].tolist()
 
 
-def test_a_start_that_fails_is_named_and_nothing_is_written(tmp_path: Any) -> None:
+def test_a_start_that_fails_is_named_and_nothing_is_written(tmp_path):
     class Broken(Behavior):
         def start(self, actor: Any) -> None:
             raise ValueError("not today")

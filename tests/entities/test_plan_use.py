@@ -57,7 +57,7 @@ def where(sim: fleet2d.Simulation) -> tuple[float, float]:
     return state["x"], state["y"]
 
 
-def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path: Any) -> None:
+def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path):
     sim = simulation(tmp_path)
     sim.advance(30)
     assert where(sim) == pytest.approx((4, 2.2), abs=1e-3)
@@ -66,7 +66,7 @@ def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path: Any) -> N
     assert [0, 2] == [plan.posture_at(time_us) for time_us in (0, 30_000_000)]
 
 
-def test_body_has_the_posture_of_the_moment_in_a_plan_that_ends_standing(tmp_path: Any) -> None:
+def test_body_has_the_posture_of_the_moment_in_a_plan_that_ends_standing(tmp_path):
     sim = simulation(tmp_path)
     sim.advance(30)
     ana = sim.actors["ana"]
@@ -74,7 +74,7 @@ def test_body_has_the_posture_of_the_moment_in_a_plan_that_ends_standing(tmp_pat
     assert [0, 2, 0] == [ana.posture_code(seconds * 10**6) for seconds in (0, 30, 119)]
 
 
-def test_sleeper_gets_up_where_it_lay_down_and_walks_on_standing(tmp_path: Any) -> None:
+def test_sleeper_gets_up_where_it_lay_down_and_walks_on_standing(tmp_path):
     sim = simulation(tmp_path)
     track = sim.actors["ana"].plan
     sim.advance(1)
@@ -88,7 +88,7 @@ def test_sleeper_gets_up_where_it_lay_down_and_walks_on_standing(tmp_path: Any) 
     assert "stand" == end.posture
 
 
-def test_way_to_the_bed_goes_round_it(tmp_path: Any) -> None:
+def test_way_to_the_bed_goes_round_it(tmp_path):
     sim = simulation(tmp_path)
     sim.advance(1)
     track = sim.actors["ana"].plan.finish().breakpoints  # type: ignore[attr-defined]
@@ -99,7 +99,7 @@ def test_way_to_the_bed_goes_round_it(tmp_path: Any) -> None:
     assert way.distance(BED.footprint) >= 0.2
 
 
-def test_place_without_an_approach_is_stepped_to_from_beside_the_object(tmp_path: Any) -> None:
+def test_place_without_an_approach_is_stepped_to_from_beside_the_object(tmp_path):
     sim = simulation(tmp_path, place=1)
     sim.advance(30)
     assert where(sim) == pytest.approx((4, 1.4), abs=1e-3)
@@ -107,18 +107,18 @@ def test_place_without_an_approach_is_stepped_to_from_beside_the_object(tmp_path
     assert where(sim) == pytest.approx((0.5, 3.5), abs=1e-3)
 
 
-def test_use_is_told_in_the_events(tmp_path: Any) -> None:
+def test_use_is_told_in_the_events(tmp_path):
     run = simulation(tmp_path).run()
     rows = run.tables["events"].to_pylist()
     assert [("uses", "bed")] == [(row["event"], row["detail"]) for row in rows]
 
 
-def test_object_without_a_place_is_refused(tmp_path: Any) -> None:
+def test_object_without_a_place_is_refused(tmp_path):
     with pytest.raises(ComponentError, match="rug has no place to use it from"):
         simulation(tmp_path, thing="rug").run()
 
 
-def test_place_moves_with_an_object_that_blocks_nothing(tmp_path: Any) -> None:
+def test_place_moves_with_an_object_that_blocks_nothing(tmp_path):
     """Places were kept as long as the free space stayed the same, which a mat doesn't change."""
     ana = simulation(tmp_path).actors["ana"]
     for x in (0.75, 2.0):
@@ -129,12 +129,12 @@ def test_place_moves_with_an_object_that_blocks_nothing(tmp_path: Any) -> None:
         assert (place.x, place.y) == ana.home.plan.lattice.point_at((x, 0.75))
 
 
-def test_unknown_object_is_refused_with_those_there_are(tmp_path: Any) -> None:
+def test_unknown_object_is_refused_with_those_there_are(tmp_path):
     with pytest.raises(ComponentError, match=r"no object 'bad': did you mean 'bed'\?.*bed, rug"):
         simulation(tmp_path, thing="bad").run()
 
 
-def test_ways_of_one_step_equal_those_of_several(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ways_of_one_step_equal_those_of_several(monkeypatch):
     """Where a body may pay costs, the core doesn't find the way: the plan is the same."""
     quick = fleet2d.run("bundled:paper", "simulation.duration=1 d", seed=4)
     monkeypatch.setattr(Space, "shortest", None)

@@ -44,13 +44,13 @@ def detections(path: Path, rows: list[tuple[float, str, float, float]]) -> Path:
 
 
 @pytest.fixture
-def kitchen(tmp_path: Path) -> Path:
+def kitchen(tmp_path):
     x, y = place("kitchen_1")
     rows = [(float(t), "ana", x, y) for t in range(600, 660)]
     return detections(tmp_path / "seen.csv", [*rows, (700.4, "person", x + 0.1, y)])
 
 
-def test_detections_are_the_observations_of_the_run(kitchen: Path) -> None:
+def test_detections_are_the_observations_of_the_run(kitchen):
     run = fleet2d.run(scenario(kitchen))
 
     table = run.tables["observations"]
@@ -63,7 +63,7 @@ def test_detections_are_the_observations_of_the_run(kitchen: Path) -> None:
     assert table["true_user"].to_pylist() == [None] * 61
 
 
-def test_events_say_when_somebody_is_seen_and_lost(kitchen: Path) -> None:
+def test_events_say_when_somebody_is_seen_and_lost(kitchen):
     run = fleet2d.run(scenario(kitchen))
 
     events = run.tables["events"].to_pylist()
@@ -76,14 +76,14 @@ def test_events_say_when_somebody_is_seen_and_lost(kitchen: Path) -> None:
     ]
 
 
-def test_algorithms_learn_from_it(kitchen: Path) -> None:
+def test_algorithms_learn_from_it(kitchen):
     run = fleet2d.run(scenario(kitchen))
 
     last = [r for r in run.tables["ltp"].to_pylist() if r["user"] == "ana"][-1]
     assert last["room"] == "kitchen_1" or run.tables["ltp"].num_rows
 
 
-def test_metrics_say_that_the_truth_is_unknown(kitchen: Path) -> None:
+def test_metrics_say_that_the_truth_is_unknown(kitchen):
     metrics = fleet2d.run(scenario(kitchen)).metrics
 
     assert metrics["detections"] == {"astro": {"unknown_truth": 61}}
@@ -91,7 +91,7 @@ def test_metrics_say_that_the_truth_is_unknown(kitchen: Path) -> None:
     assert metrics["sightings"] == {}
 
 
-def test_known_truth_and_real_sightings_score_the_belief(tmp_path: Path, kitchen: Path) -> None:
+def test_known_truth_and_real_sightings_score_the_belief(tmp_path, kitchen):
     x, y = place("kitchen_1")
     truth = tmp_path / "uwb.csv"
     truth.write_text("time,x,y\n" + "".join(f"{t},{x},{y}\n" for t in range(600, 2400, 30)))
@@ -107,7 +107,7 @@ def test_known_truth_and_real_sightings_score_the_belief(tmp_path: Path, kitchen
     assert metrics["sightings"]["ana"] == pytest.approx(60 / 1771, rel=0.01)
 
 
-def test_every_span_length_gives_the_same_run(kitchen: Path) -> None:
+def test_every_span_length_gives_the_same_run(kitchen):
     content = scenario(kitchen)
     content["robots"]["astro"]["behaviors"] = [{"type": "opportunistic"}, {"type": "patrol"}]
 
@@ -116,7 +116,7 @@ def test_every_span_length_gives_the_same_run(kitchen: Path) -> None:
     assert len(digests) == 1
 
 
-def test_a_checkpoint_continues_with_the_same_detections(kitchen: Path) -> None:
+def test_a_checkpoint_continues_with_the_same_detections(kitchen):
     import copy
 
     simulation = fleet2d.Simulation(scenario(kitchen))
@@ -125,7 +125,7 @@ def test_a_checkpoint_continues_with_the_same_detections(kitchen: Path) -> None:
     assert copy.deepcopy(simulation).run().digest == fleet2d.run(scenario(kitchen)).digest
 
 
-def test_positions_in_the_frame_of_the_robot_turn_with_it(tmp_path: Path) -> None:
+def test_positions_in_the_frame_of_the_robot_turn_with_it(tmp_path):
     path = detections(tmp_path / "seen.csv", [(t, "ana", 1.0, 0.5) for t in range(0, 600, 10)])
     content = scenario(path, relative_to="robot")
     content["robots"]["astro"]["behaviors"] = [{"type": "patrol"}]
@@ -139,7 +139,7 @@ def test_positions_in_the_frame_of_the_robot_turn_with_it(tmp_path: Path) -> Non
     assert np.allclose(table["y"].to_numpy(), poses.y[:60] + sin + 0.5 * cos, atol=2e-3)
 
 
-def test_the_frame_moves_positions(kitchen: Path, tmp_path: Path) -> None:
+def test_the_frame_moves_positions(kitchen, tmp_path):
     x, y = place("kitchen_1")
     path = detections(tmp_path / "moved.csv", [(0, "ana", x - 2, y + 1)])
 
@@ -148,7 +148,7 @@ def test_the_frame_moves_positions(kitchen: Path, tmp_path: Path) -> None:
     assert run.tables["observations"]["room"].to_pylist() == ["kitchen_1"]
 
 
-def test_few_detections_outside_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_few_detections_outside_are_left_out_and_counted(tmp_path):
     x, y = place("kitchen_1")
     rows = [(t, "ana", x, y) for t in range(9)] + [(9, "ana", -40.0, y)]
     path = detections(tmp_path / "seen.csv", rows)
@@ -161,7 +161,7 @@ def test_few_detections_outside_are_left_out_and_counted(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("turn", [90.0, 180.0])
-def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path: Path, turn: float) -> None:
+def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path, turn):
     x, y = place("kitchen_1")
     path = detections(tmp_path / "seen.csv", [(float(t), "ana", x, y) for t in range(9)])
 
@@ -172,7 +172,7 @@ def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path: Path, tur
 
 
 @pytest.mark.slow
-def test_a_frame_off_by_a_metre_is_told_where_it_leads_through_walls(tmp_path: Path) -> None:
+def test_a_frame_off_by_a_metre_is_told_where_it_leads_through_walls(tmp_path):
     """Within the reach of a metre nothing is left out, but what is in walls is counted."""
     x, y = place("kitchen_1")
     rows = [(t, "ana", x + t / 10 - 4, y) for t in range(80)]  # through the walls beside
@@ -184,7 +184,7 @@ def test_a_frame_off_by_a_metre_is_told_where_it_leads_through_walls(tmp_path: P
     assert "detections are in or behind walls, by up to 0." in notes
 
 
-def test_what_is_from_before_the_run_is_left_out_and_counted(kitchen: Path) -> None:
+def test_what_is_from_before_the_run_is_left_out_and_counted(kitchen):
     content = scenario(kitchen)
     content["simulation"]["start"] = "2026-01-05T00:10:30"
 
@@ -218,9 +218,7 @@ def test_what_is_from_before_the_run_is_left_out_and_counted(kitchen: Path) -> N
         ),
     ],
 )
-def test_a_log_that_does_not_fit_is_refused(
-    tmp_path: Path, rows: list[Any], options: dict[str, Any], message: str
-) -> None:
+def test_a_log_that_does_not_fit_is_refused(tmp_path, rows, options, message):
     with pytest.raises(InputError) as caught:
         fleet2d.Simulation(scenario(detections(tmp_path / "seen.csv", rows), **options))
 
@@ -235,7 +233,7 @@ def test_a_log_that_does_not_fit_is_refused(
         ({"perception": {"false_positives": {"per_hour": 1}}}, "give 'perceives' or 'perception'"),
     ],
 )
-def test_a_robot_perceives_in_one_way(kitchen: Path, change: dict[str, Any], message: str) -> None:
+def test_a_robot_perceives_in_one_way(kitchen, change, message):
     content = scenario(kitchen)
     content["robots"]["astro"] |= change
 
@@ -243,7 +241,7 @@ def test_a_robot_perceives_in_one_way(kitchen: Path, change: dict[str, Any], mes
         fleet2d.Simulation(content)
 
 
-def test_there_must_be_users(kitchen: Path) -> None:
+def test_there_must_be_users(kitchen):
     content = scenario(kitchen) | {
         "users": {"ana": None},
         "algorithms": {"ltp": None},
@@ -254,14 +252,14 @@ def test_there_must_be_users(kitchen: Path) -> None:
         fleet2d.Simulation(content)
 
 
-def test_its_camera_cannot_be_disturbed(kitchen: Path) -> None:
+def test_its_camera_cannot_be_disturbed(kitchen):
     simulation = fleet2d.Simulation(scenario(kitchen))
 
     with pytest.raises(InputError, match="its cameras can't be changed"):
         simulation.do({"switch_off": "astro", "camera": True})
 
 
-def test_the_log_is_an_input_of_the_run(kitchen: Path, tmp_path: Path) -> None:
+def test_the_log_is_an_input_of_the_run(kitchen, tmp_path):
     run = fleet2d.run(scenario(kitchen), out=tmp_path / "run")
 
     assert [Path(i["path"]).name for i in run.manifest["inputs"]] == ["seen.csv"]
@@ -281,7 +279,7 @@ def both_ways(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     )
 
 
-def test_detections_besides_the_cameras_are_injected_ones(tmp_path: Path) -> None:
+def test_detections_besides_the_cameras_are_injected_ones(tmp_path):
     """A table of them is as good as a script, and a hundred times as fast."""
     table, script = (fleet2d.run(content) for content in both_ways(tmp_path))
 
@@ -290,7 +288,7 @@ def test_detections_besides_the_cameras_are_injected_ones(tmp_path: Path) -> Non
         assert table.tables[name].to_pylist() == script.tables[name].to_pylist()
 
 
-def test_detections_besides_the_cameras_are_the_same_for_every_span(tmp_path: Path) -> None:
+def test_detections_besides_the_cameras_are_the_same_for_every_span(tmp_path):
     content, _ = both_ways(tmp_path)
     content["robots"]["astro"]["perception"] = {"detection": {"posture": {"sit": 0.5}}}
 

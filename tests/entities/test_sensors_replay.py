@@ -32,7 +32,7 @@ def write(folder: Path, text: str) -> Path:
 
 
 @pytest.mark.parametrize("span", [1, 100, None])
-def test_readings_are_those_of_the_table(tmp_path: Path, span: int | None) -> None:
+def test_readings_are_those_of_the_table(tmp_path, span):
     run = fleet2d.run(scenario(write(tmp_path, ROWS), sensor="door"), max_span=span)
 
     rows = [(r["step"], r["sensor"], r["state"]) for r in run.tables["sensors"].to_pylist()]
@@ -52,7 +52,7 @@ sensor.temperature,21.4,2026-03-28T22:10:00.000Z
 """
 
 
-def test_home_assistants_unavailable_is_a_gap_that_a_note_tells(tmp_path: Path) -> None:
+def test_home_assistants_unavailable_is_a_gap_that_a_note_tells(tmp_path):
     keys = {"sensor": "binary_sensor.kitchen", "day": "date", "time_zone": "Europe/Berlin"}
     content = scenario(write(tmp_path, HISTORY), **keys)
     content["simulation"] |= {"start": "2026-03-28T22:00", "duration": "8 h"}
@@ -67,7 +67,7 @@ def test_home_assistants_unavailable_is_a_gap_that_a_note_tells(tmp_path: Path) 
     assert note in run.manifest["notes"]
 
 
-def test_what_is_outside_of_the_run_is_told(tmp_path: Path) -> None:
+def test_what_is_outside_of_the_run_is_told(tmp_path):
     content = scenario(write(tmp_path, ROWS), sensor="door")
     content["simulation"]["duration"] = "11 min"
 
@@ -76,7 +76,7 @@ def test_what_is_outside_of_the_run_is_told(tmp_path: Path) -> None:
     assert "objects.front: of 4 readings, 0 are before the run and 2 after its end" in notes
 
 
-def test_sensors_of_one_table_begin_with_the_same_day(tmp_path: Path) -> None:
+def test_sensors_of_one_table_begin_with_the_same_day(tmp_path):
     text = ROWS + "2026-01-06 00:05:00,bell,ON\n"
     content = scenario(write(tmp_path, text), sensor="bell", day=0)
 
@@ -102,9 +102,7 @@ def test_sensors_of_one_table_begin_with_the_same_day(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_wrong_table_is_refused(
-    tmp_path: Path, text: str, settings: dict[str, Any], message: str
-) -> None:
+def test_a_wrong_table_is_refused(tmp_path, text, settings, message):
     with pytest.raises(InputError) as caught:
         fleet2d.Simulation(scenario(write(tmp_path, text), **settings))
 

@@ -83,9 +83,7 @@ def theirs(formula: str, x: list[float], y: list[float]) -> Any:
 )
 @settings(max_examples=examples(25), deadline=None)
 @given(x=signals, y=signals)
-def test_robustness_equals_that_of_rtamt(
-    formula: str, expectation: Expectation, ahead: int, x: list[float], y: list[float]
-) -> None:
+def test_robustness_equals_that_of_rtamt(formula, expectation, ahead, x, y):
     known = known_of({"x": x, "y": y}, STEPS, over=True)
     ours = np.array(dense(expectation.robustness(known, True)))
 
@@ -95,7 +93,7 @@ def test_robustness_equals_that_of_rtamt(
 
 
 @given(x=signals)
-def test_holds_for_is_historically(x: list[float]) -> None:
+def test_holds_for_is_historically(x):
     known = known_of({"x": x}, STEPS, over=True)
     ours = np.array(dense(holds_for(X >= 0.5, "3 s").robustness(known, True)))
 

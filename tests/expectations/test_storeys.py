@@ -40,7 +40,7 @@ def verdicts(
     return found
 
 
-def test_bodies_and_places_of_two_storeys_are_far_apart(tmp_path: Path) -> None:
+def test_bodies_and_places_of_two_storeys_are_far_apart(tmp_path):
     found = verdicts(
         tmp_path,
         body="never(distance(astro, ana) < 3 m)",
@@ -52,7 +52,7 @@ def test_bodies_and_places_of_two_storeys_are_far_apart(tmp_path: Path) -> None:
     assert found == {"body": [(30, 59)], "room": [], "point": [], "sofa": [(30, 59)]}
 
 
-def test_a_place_of_the_same_storey_is_as_far_as_ever(tmp_path: Path) -> None:
+def test_a_place_of_the_same_storey_is_as_far_as_ever(tmp_path):
     found = verdicts(
         tmp_path,
         room="always(distance(luna, above) == 0)",
@@ -63,7 +63,7 @@ def test_a_place_of_the_same_storey_is_as_far_as_ever(tmp_path: Path) -> None:
     assert found == {"room": [], "point": [], "kinds": []}
 
 
-def test_the_nearest_is_on_the_same_storey(tmp_path: Path) -> None:
+def test_the_nearest_is_on_the_same_storey(tmp_path):
     found = verdicts(
         tmp_path,
         above="always(implies(room(ana) == above, nearest(ana) == luna))",
@@ -73,14 +73,14 @@ def test_the_nearest_is_on_the_same_storey(tmp_path: Path) -> None:
     assert found == {"above": [], "below": []}
 
 
-def test_without_portals_the_plan_is_one_storey(tmp_path: Path) -> None:
+def test_without_portals_the_plan_is_one_storey(tmp_path):
     found = verdicts(tmp_path, stairs=False, body="never(distance(astro, ana) < 3 m)")
 
     assert found == {"body": [(0, 59)]}
 
 
 @pytest.mark.parametrize("max_span", [1, 7])
-def test_spans_change_no_distance(tmp_path: Path, max_span: int) -> None:
+def test_spans_change_no_distance(tmp_path, max_span):
     expected = {"near": "always(distance(astro, ana) < 1.5 m)"}
     path = tmp_path / "house.json"
     path.write_text(json.dumps(PLAN))
@@ -99,7 +99,7 @@ def test_spans_change_no_distance(tmp_path: Path, max_span: int) -> None:
     assert whole.tables["violations"].equals(short.tables["violations"])
 
 
-def test_a_garage_that_nothing_joins_is_on_the_storey_beside_it(tmp_path: Path) -> None:
+def test_a_garage_that_nothing_joins_is_on_the_storey_beside_it(tmp_path):
     corners = [[0, -4], [5, -4], [5, -0.3], [0, -0.3]]
     garage = {"name": "garage", "type": "garage", "polygon": corners}
     house = {**PLAN, "free": [*PLAN["free"], corners], "rooms": [*PLAN["rooms"], garage]}

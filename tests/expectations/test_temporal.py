@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.reference.expectations import Formula, robustness
+from tests.reference.expectations import robustness
 from tests.thorough import examples
 
 from fleet2d.expectations import (
@@ -103,16 +103,7 @@ def dense(trace: Trace) -> list[float]:
 
 @settings(max_examples=examples(200))
 @given(formulas, truths, truths, numbers, numbers, st.integers(1, 14), st.booleans(), st.booleans())
-def test_the_robustness_of_each_step_equals_the_reference(
-    formula: Formula,
-    a: list[float],
-    b: list[float],
-    x: list[float],
-    y: list[float],
-    end: int,
-    over: bool,
-    high: bool,
-) -> None:
+def test_the_robustness_of_each_step_equals_the_reference(formula, a, b, x, y, end, over, high):
     signals = {"a": a, "b": b, "x": x, "y": y}
     expected = [
         robustness(formula, signals, step, end, over=over, high=high) for step in range(end)
@@ -127,7 +118,7 @@ def violated(expectation: Expectation, signals: dict[str, list[float]]) -> list[
 
 
 @given(numbers)
-def test_violations_are_the_longest_stretches_that_fail(x: list[float]) -> None:
+def test_violations_are_the_longest_stretches_that_fail(x):
     wrong = [step for step, number in enumerate(x) if not number > 0]
     begins = [step for step in wrong if step - 1 not in wrong]
     ends = [step for step in wrong if step + 1 not in wrong]
@@ -136,7 +127,7 @@ def test_violations_are_the_longest_stretches_that_fail(x: list[float]) -> None:
     assert list(zip(begins, ends, strict=True)) == violated(never(~(metric("x") > 0)), {"x": x})
 
 
-def test_a_signal_on_its_limit_is_on_the_side_of_the_comparison() -> None:
+def test_a_signal_on_its_limit_is_on_the_side_of_the_comparison():
     known = known_of({"x": [1.0] * 14}, 14, over=True)
 
     assert verdict_of("", always(metric("x") >= 1), known).holds
@@ -144,14 +135,14 @@ def test_a_signal_on_its_limit_is_on_the_side_of_the_comparison() -> None:
     assert verdict_of("", always(metric("x") > 1), known).content()["robustness"] == 0
 
 
-def test_a_missing_value_is_on_neither_side() -> None:
+def test_a_missing_value_is_on_neither_side():
     known = known_of({"x": [float("nan"), *[1.0] * 13]}, 14, over=True)
 
     assert verdict_of("", always(metric("x") > 0), known).violations[0][:2] == (0, 0)
     assert verdict_of("", never(metric("x") < 0), known).holds
 
 
-def test_after_names_each_occasion_that_was_missed_and_by_how_much() -> None:
+def test_after_names_each_occasion_that_was_missed_and_by_how_much():
     a, b = [0] * 14, [0] * 14
     a[1] = a[5] = 1
     b[2] = 1
@@ -165,7 +156,7 @@ def test_after_names_each_occasion_that_was_missed_and_by_how_much() -> None:
     assert (verdict.holds, verdict.slack_s) == (True, 1.0)
 
 
-def test_occasions_cut_by_the_end_of_the_run_do_not_count() -> None:
+def test_occasions_cut_by_the_end_of_the_run_do_not_count():
     a = [0] * 12 + [1, 0]
     expectation = after(moving("a"), moving("b"), within="3 s")
     verdict = verdict_of("", expectation, known_of({"a": a, "b": [0] * 14}, 14, over=True))
@@ -178,7 +169,7 @@ def test_occasions_cut_by_the_end_of_the_run_do_not_count() -> None:
     assert (verdict.holds, verdict.occasions) == (True, 1)
 
 
-def test_an_expectation_is_decided_as_soon_as_nothing_can_change_it() -> None:
+def test_an_expectation_is_decided_as_soon_as_nothing_can_change_it():
     b = [0, 0, 0, 1] + [0] * 10
     expectation = eventually(moving("b"), within="5 s")
 
@@ -192,7 +183,7 @@ def test_an_expectation_is_decided_as_soon_as_nothing_can_change_it() -> None:
 
 
 @pytest.mark.parametrize(("times", "holds"), [(2, False), (3, True)])
-def test_at_most_counts_each_event_of_an_hour(times: int, holds: bool) -> None:
+def test_at_most_counts_each_event_of_an_hour(times, holds):
     steps = [0, 1, 1, 5000, 7300]
     counts = [float(steps.count(step)) for step in range(8000)]
     expectation = at_most(times, events("calls"), per="hour")

@@ -21,16 +21,14 @@ TASKS = ("hangout", "find", "patrol", "interact")
 
 
 @pytest.fixture
-def script(monkeypatch: pytest.MonkeyPatch) -> Any:
+def script(monkeypatch):
     """Return the names of a script, which may import those beside it."""
     monkeypatch.syspath_prepend(str(AGENTS))
     return lambda name: runpy.run_path(str(AGENTS / f"{name}.py"), run_name="script")
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_model_of_stable_baselines_becomes_the_policy_of_a_robot(
-    tmp_path: Path, script: Any
-) -> None:
+def test_model_of_stable_baselines_becomes_the_policy_of_a_robot(tmp_path, script):
     pytest.importorskip("sb3_contrib", reason="needs sb3-contrib")
     train, path = script("train"), tmp_path / "hangout.onnx"
     for function in ("train", "export"):
@@ -48,12 +46,8 @@ def test_model_of_stable_baselines_becomes_the_policy_of_a_robot(
 @pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 def test_table_of_a_task_has_everybody_and_no_one_above_the_bound(
-    task: str,
-    tmp_path: Path,
-    script: Any,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    task, tmp_path, script, monkeypatch, capsys
+):
     table = script("table")
     content = load_task(task).model_dump(exclude_unset=True)
     content["scenario"]["simulation"]["duration"] = "2 d"
@@ -105,7 +99,7 @@ def slow_bound(people: list[Any], stations: Any, weights: dict[str, float]) -> f
     return best[0][0]
 
 
-def test_bound_of_waiting_is_that_of_the_slow_recursion(script: Any) -> None:
+def test_bound_of_waiting_is_that_of_the_slow_recursion(script):
     bounds = script("bounds")
     random = np.random.default_rng(1)
     room = np.repeat(random.integers(-1, 3, 60), 5)
@@ -121,7 +115,7 @@ def test_bound_of_waiting_is_that_of_the_slow_recursion(script: Any) -> None:
     )
 
 
-def test_who_knows_the_life_comes_near_the_bound_of_waiting(script: Any) -> None:
+def test_who_knows_the_life_comes_near_the_bound_of_waiting(script):
     bounds = script("bounds")
     weights = load_task("hangout").reward
     env = RobotEnv("hangout", SHORT, split="test")
@@ -140,7 +134,7 @@ def test_who_knows_the_life_comes_near_the_bound_of_waiting(script: Any) -> None
     assert 0.9 * bound < total <= bound
 
 
-def test_bound_of_a_request_is_that_of_its_best_moment(script: Any) -> None:
+def test_bound_of_a_request_is_that_of_its_best_moment(script):
     """One try: the largest expected value; more tries: at least as much."""
     from fleet2d.interactions.interaction import Interaction
 
@@ -165,7 +159,7 @@ def test_bound_of_a_request_is_that_of_its_best_moment(script: Any) -> None:
     assert 0 == worth(3, pieces[:1])  # it wakes nobody for that
 
 
-def test_bounds_of_searches_and_visits(script: Any) -> None:
+def test_bounds_of_searches_and_visits(script):
     bounds = script("bounds")
     may = np.zeros(7200 * 3, np.bool_)
     may[7200 + 599] = may[2 * 7200 + 600] = True
@@ -177,12 +171,7 @@ def test_bounds_of_searches_and_visits(script: Any) -> None:
     assert pytest.approx(max(rewards)) == bounds["patrol_bound"](5, 2 * 86400, weights)
 
 
-def test_written_policy_is_the_behavior_of_a_robot(
-    tmp_path: Path,
-    script: Any,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_written_policy_is_the_behavior_of_a_robot(tmp_path, script, monkeypatch, capsys):
     pytest.importorskip("onnx", reason="needs onnx")
     path = tmp_path / "small.onnx"
     monkeypatch.setattr(sys, "argv", ["last_seen.py", str(path)])

@@ -46,7 +46,7 @@ def write(
 
 
 @pytest.mark.parametrize(("unit_m", "units"), [(1.0, 6), (0.001, 4), (0.001, 0), (0.01, 5)])
-def test_walls_of_two_lines_bound_two_rooms(tmp_path: Path, unit_m: float, units: int) -> None:
+def test_walls_of_two_lines_bound_two_rooms(tmp_path, unit_m, units):
     plan = load_floorplan(write(tmp_path, unit_m, units))
 
     assert plan.area_m2 == pytest.approx(3.8 * 3.6 + 3.6 * 3.6 + 0.2 * 0.9, abs=0.4)
@@ -54,7 +54,7 @@ def test_walls_of_two_lines_bound_two_rooms(tmp_path: Path, unit_m: float, units
     assert [(0, 1)] == [tuple(sorted(door.rooms)) for door in plan.doorways]
 
 
-def test_layers_and_scale_can_be_named(tmp_path: Path) -> None:
+def test_layers_and_scale_can_be_named(tmp_path):
     path = write(tmp_path, layer="0-MAIN")
 
     named = Dxf(path=path, walls="0-*").load()
@@ -65,7 +65,7 @@ def test_layers_and_scale_can_be_named(tmp_path: Path) -> None:
         Dxf(path=path, walls="WALLS").load()
 
 
-def test_damaged_and_empty_drawings_are_refused(tmp_path: Path) -> None:
+def test_damaged_and_empty_drawings_are_refused(tmp_path):
     (tmp_path / "text.dxf").write_text("hello")
     ezdxf.new().saveas(tmp_path / "empty.dxf")
 
@@ -77,7 +77,7 @@ def test_damaged_and_empty_drawings_are_refused(tmp_path: Path) -> None:
         load_floorplan(tmp_path / "none.dxf")
 
 
-def test_one_sees_through_windows_between_rooms(tmp_path: Path) -> None:
+def test_one_sees_through_windows_between_rooms(tmp_path):
     inner = [[(x, 2.7), (x, 3.5)] for x in (4.0, 4.1, 4.2)]
     outer = [[(1, y), (2, y)] for y in (0, 0.1, 0.2)]
     sides = [[(4.0, y), (4.2, y)] for y in (2.7, 3.5)]
@@ -122,7 +122,7 @@ def drawn(home: SmallHome, k: int, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
-def test_drawings_of_any_unit_language_and_turn_are_the_home(tmp_path: Path, k: int) -> None:
+def test_drawings_of_any_unit_language_and_turn_are_the_home(tmp_path, k):
     home = small_home(k, turns=(0, 90, 17, 0, 45))
 
     plan = load_floorplan(drawn(home, k, tmp_path))
@@ -134,7 +134,7 @@ def test_drawings_of_any_unit_language_and_turn_are_the_home(tmp_path: Path, k: 
     assert math.dist(plan.entrance, front - lowest) < 0.5
 
 
-def test_a_drawing_without_a_unit_and_doors_is_refused_with_the_sizes(tmp_path: Path) -> None:
+def test_a_drawing_without_a_unit_and_doors_is_refused_with_the_sizes(tmp_path):
     drawing: Any = ezdxf.new(units=0)
     for corners in (
         [(0, 0), (900, 0), (900, 700), (0, 700)],

@@ -51,7 +51,7 @@ def play(env: Any, seed: int | None = None, steps: int = 10**6) -> Iterator[tupl
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_gymnasium_has_no_complaint(task: str) -> None:
+def test_gymnasium_has_no_complaint(task):
     from gymnasium.utils.env_checker import check_env
 
     env = gymnasium.make(f"fleet2d/{task.title()}-v1", task=short(task))
@@ -60,7 +60,7 @@ def test_gymnasium_has_no_complaint(task: str) -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_actions_are_sampled_by_the_mask(task: str) -> None:
+def test_actions_are_sampled_by_the_mask(task):
     env = RobotEnv(short(task), masked="error")
     _, info = env.reset(seed=1)
 
@@ -72,7 +72,7 @@ def test_actions_are_sampled_by_the_mask(task: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:Your observation")  # a table, for which it has no network
-def test_stable_baselines_has_no_complaint() -> None:
+def test_stable_baselines_has_no_complaint():
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="not installed")
 
     checker.check_env(RobotEnv("hangout", SHORT), skip_render_check=True)
@@ -86,14 +86,14 @@ def two_robots() -> dict[str, Any]:
     return {**flat(), "robots": robots}
 
 
-def test_pettingzoo_has_no_complaint() -> None:
+def test_pettingzoo_has_no_complaint():
     from pettingzoo.test import parallel_api_test, parallel_seed_test
 
     parallel_api_test(RobotsEnv({"scenario": two_robots()}), num_cycles=60)
     parallel_seed_test(lambda: RobotsEnv({"scenario": two_robots()}), num_cycles=20)
 
 
-def test_robots_sample_their_actions_by_their_masks() -> None:
+def test_robots_sample_their_actions_by_their_masks():
     env = RobotsEnv({"scenario": two_robots()}, masked="error")
     _, infos = env.reset(seed=1)
     for _ in range(10):
@@ -105,7 +105,7 @@ def test_robots_sample_their_actions_by_their_masks() -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_environments_are_made_by_name(task: str) -> None:
+def test_environments_are_made_by_name(task):
     env = gymnasium.make(f"fleet2d/{task.title()}-v1")
 
     many = gymnasium.make_vec(
@@ -119,7 +119,7 @@ def test_environments_are_made_by_name(task: str) -> None:
     assert (3, rows, columns) == many.observation_space.shape
 
 
-def test_environment_of_a_scenario_file(tmp_path: Any) -> None:
+def test_environment_of_a_scenario_file(tmp_path):
     import yaml
 
     path = tmp_path / "home.yaml"
@@ -129,7 +129,7 @@ def test_environment_of_a_scenario_file(tmp_path: Any) -> None:
     assert {0.0, -1.0} == {reward for _, reward, *_ in play(env)}
 
 
-def test_life_is_truncated_at_its_end_and_intervals_add_up() -> None:
+def test_life_is_truncated_at_its_end_and_intervals_add_up():
     steps = list(play(RobotEnv(flat()), seed=1))
 
     assert [False] * len(steps) == [terminated for _, _, terminated, *_ in steps]
@@ -137,7 +137,7 @@ def test_life_is_truncated_at_its_end_and_intervals_add_up() -> None:
     assert 4 * 3600 == sum(info["elapsed_s"] for *_, info in steps)
 
 
-def test_rewards_add_up_to_the_terms_of_the_whole_run() -> None:
+def test_rewards_add_up_to_the_terms_of_the_whole_run():
     weights = {"near_min": 1.0, "disturbing_min": -1.0, "relocations": -0.5}
     env = RobotEnv({"scenario": flat(), "reward": weights})
     total = sum(reward for _, reward, *_ in play(env, seed=1))
@@ -147,13 +147,13 @@ def test_rewards_add_up_to_the_terms_of_the_whole_run() -> None:
     assert terms["relocations"] > 0
 
 
-def test_reward_may_be_a_function() -> None:
+def test_reward_may_be_a_function():
     env = RobotEnv(flat(), reward=lambda env: env.present.simulation.step)
 
     assert all(reward == info["elapsed_s"] for _, reward, *_, info in play(env, 1, steps=1))
 
 
-def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name() -> None:
+def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name():
     with pytest.raises(Exception, match="relocations"):
         RobotEnv(flat(), reward={"relocation": 1.0})
 
@@ -170,12 +170,12 @@ def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name() -> None:
         ({"floorplan.sed": {"train": [1]}}, "unknown key 'sed': did you mean 'seed'"),
     ],
 )
-def test_wrong_values_of_what_varies_are_an_error_that_says_which(vary: Any, message: str) -> None:
+def test_wrong_values_of_what_varies_are_an_error_that_says_which(vary, message):
     with pytest.raises(InputError, match=message):
         RobotEnv({"scenario": load_task("hangout").scenario, "vary": vary})
 
 
-def test_values_may_be_whole_sections_of_the_scenario() -> None:
+def test_values_may_be_whole_sections_of_the_scenario():
     users = [{"ana": {"type": "routine", "persona": name}} for name in ("student", "retired")]
     env = RobotEnv({"scenario": flat(), "vary": {"users": {"train": users}}})
 
@@ -184,7 +184,7 @@ def test_values_may_be_whole_sections_of_the_scenario() -> None:
     assert set(env.present.simulation.scenario.users) == {"ana"}
 
 
-def test_unknown_option_of_a_reset_is_an_error_and_keeps_the_life() -> None:
+def test_unknown_option_of_a_reset_is_an_error_and_keeps_the_life():
     env = RobotEnv(flat())
     env.reset(seed=1)
     life = env.life
@@ -196,7 +196,7 @@ def test_unknown_option_of_a_reset_is_an_error_and_keeps_the_life() -> None:
 
 
 @pytest.mark.parametrize("action", ["a", 1.5, float("nan"), np.array([0])])
-def test_action_that_is_no_whole_number_is_an_error(action: Any) -> None:
+def test_action_that_is_no_whole_number_is_an_error(action):
     env = RobotEnv(flat())
     env.reset(seed=1)
 
@@ -205,7 +205,7 @@ def test_action_that_is_no_whole_number_is_an_error(action: Any) -> None:
 
 
 @pytest.mark.parametrize("action", [4, 6, 8, -1])
-def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
+def test_impossible_action_is_an_error_and_changes_nothing(action):
     env = RobotEnv(flat(), masked="error")
     _, info = env.reset(seed=1)
     storage = env.present.simulation.home.plan.room("storage_1").index
@@ -217,7 +217,7 @@ def test_impossible_action_is_an_error_and_changes_nothing(action: int) -> None:
     assert env.step(7)[4]["elapsed_s"] == 600
 
 
-def test_masked_action_means_to_rest() -> None:
+def test_masked_action_means_to_rest():
     env = RobotEnv(flat())
     env.reset(seed=1)
     storage = env.present.simulation.home.plan.room("storage_1").index
@@ -225,7 +225,7 @@ def test_masked_action_means_to_rest() -> None:
     assert 600 == env.step(storage)[4]["elapsed_s"]
 
 
-def test_step_without_a_life_and_after_its_end_is_an_error() -> None:
+def test_step_without_a_life_and_after_its_end_is_an_error():
     env = RobotEnv(flat(duration="30 min"))
     with pytest.raises(InputError, match="call reset"):
         env.step(0)
@@ -234,7 +234,7 @@ def test_step_without_a_life_and_after_its_end_is_an_error() -> None:
         env.step(7)
 
 
-def test_empty_battery_terminates_the_life() -> None:
+def test_empty_battery_terminates_the_life():
     battery = {"driving": "10 min", "standing": "1 h", "charging": "30 min", "charger": "kitchen"}
     *_, (_, _, terminated, truncated, info) = play(RobotEnv(flat(astro={"battery": battery})), 1)
 
@@ -242,7 +242,7 @@ def test_empty_battery_terminates_the_life() -> None:
     assert info["elapsed_s"] > 0
 
 
-def test_nobody_at_home_is_never_found() -> None:
+def test_nobody_at_home_is_never_found():
     env = RobotEnv(
         {"scenario": flat("find", ana=OUT), "reward": {"finds": 1.0, "searching_min": -1.0}}
     )
@@ -253,12 +253,12 @@ def test_nobody_at_home_is_never_found() -> None:
     assert sum(steps) == pytest.approx(-env.present.terms("astro")["searching_min"]) != 0
 
 
-def test_truth_is_told_only_if_asked_for() -> None:
+def test_truth_is_told_only_if_asked_for():
     assert "truth" not in RobotEnv(flat()).reset()[1]
     assert {"ana", "astro"} == set(RobotEnv(flat(), truth=True).reset()[1]["truth"])
 
 
-def test_same_seed_is_the_same_episode_in_any_number_of_environments() -> None:
+def test_same_seed_is_the_same_episode_in_any_number_of_environments():
     settings: dict[str, Any] = {"task": load_task("hangout")}
     few, many = VectorRobotEnv(2, SHORT, **settings), VectorRobotEnv(3, SHORT, **settings)
     first, second = few.reset(seed=5)[0], many.reset(seed=5)[0]
@@ -270,7 +270,7 @@ def test_same_seed_is_the_same_episode_in_any_number_of_environments() -> None:
         assert np.array_equal(rewards[0], other[0][:2])
 
 
-def test_lives_are_those_of_single_environments() -> None:
+def test_lives_are_those_of_single_environments():
     lives, env = VectorRobotEnv(2, task=flat()), RobotEnv(flat())
     observations, info = lives.reset(seed=3)
     single, own = env.reset(seed=4)
@@ -288,7 +288,7 @@ def test_lives_are_those_of_single_environments() -> None:
     assert not (terminated | truncated).any()
 
 
-def test_pickled_environment_goes_on_as_the_original() -> None:
+def test_pickled_environment_goes_on_as_the_original():
     env = RobotEnv(flat())
     list(play(env, seed=1, steps=5))
     twin = pickle.loads(pickle.dumps(env))
@@ -299,7 +299,7 @@ def test_pickled_environment_goes_on_as_the_original() -> None:
     assert np.array_equal(env.reset()[0], twin.reset()[0])
 
 
-def test_pickled_environments_go_on_as_the_originals() -> None:
+def test_pickled_environments_go_on_as_the_originals():
     lives = VectorRobotEnv(2, task=flat())
     lives.reset(seed=1)
     twins = pickle.loads(pickle.dumps(lives))
@@ -309,7 +309,7 @@ def test_pickled_environments_go_on_as_the_originals() -> None:
         assert np.array_equal(one[1], other[1])
 
 
-def test_branch_goes_its_own_way_and_leaves_the_original_as_it_was() -> None:
+def test_branch_goes_its_own_way_and_leaves_the_original_as_it_was():
     env = RobotEnv(flat())
     list(play(env, seed=1, steps=5))
     twin, other = env.branch(), env.branch()
@@ -324,7 +324,7 @@ def test_branch_goes_its_own_way_and_leaves_the_original_as_it_was() -> None:
     )
 
 
-def test_reset_in_the_middle_begins_anew_and_nothing_grows() -> None:
+def test_reset_in_the_middle_begins_anew_and_nothing_grows():
     import gc
 
     env = RobotEnv(flat(duration="30 min"))
@@ -341,7 +341,7 @@ def test_reset_in_the_middle_begins_anew_and_nothing_grows() -> None:
     assert counts[2] - counts[1] < 200
 
 
-def test_run_of_a_life_is_stored_as_any_other() -> None:
+def test_run_of_a_life_is_stored_as_any_other():
     env = RobotEnv(flat())
     list(play(env, seed=1))
 
@@ -349,7 +349,7 @@ def test_run_of_a_life_is_stored_as_any_other() -> None:
     assert {"trajectories", "events", "observations"} <= set(env.run().tables)
 
 
-def test_policies_from_files_repeat_the_episode(tmp_path: Any) -> None:
+def test_policies_from_files_repeat_the_episode(tmp_path):
     path = tmp_path / "policy.onnx"
     path.write_bytes(scores_of_rooms("visited_20min", "visited_6h"))
     content = flat(duration="8 h")
@@ -396,7 +396,7 @@ def scores_of_rooms(*names: str) -> bytes:
     return bytes(model.SerializeToString())
 
 
-def test_broken_policy_file_is_named(tmp_path: Any) -> None:
+def test_broken_policy_file_is_named(tmp_path):
     pytest.importorskip("onnxruntime", reason="needs the extra onnx")
     path = tmp_path / "policy.onnx"
     path.write_bytes(b"no network")
@@ -406,7 +406,7 @@ def test_broken_policy_file_is_named(tmp_path: Any) -> None:
         fleet2d.run(content)
 
 
-def test_discount_is_by_time() -> None:
+def test_discount_is_by_time():
     env = DiscountByTime(RobotEnv(flat(), reward={"near_min": 1.0}), half_life="20 min")
     plain = RobotEnv(flat(), reward={"near_min": 1.0})
     env.reset(seed=1)
@@ -418,7 +418,7 @@ def test_discount_is_by_time() -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_task_draws_homes_apart_for_each_split(task: str) -> None:
+def test_task_draws_homes_apart_for_each_split(task):
     random = np.random.default_rng(0)
     splits: tuple[Split, ...] = get_args(Split)
     homes = [
@@ -429,22 +429,22 @@ def test_task_draws_homes_apart_for_each_split(task: str) -> None:
     assert sum(map(len, homes)) == len(set.union(*homes))
 
 
-def test_unknown_split_has_the_nearest_name() -> None:
+def test_unknown_split_has_the_nearest_name():
     with pytest.raises(InputError, match="did you mean 'validation'"):
         RobotEnv("hangout", split="validate")  # type: ignore[arg-type]
 
 
-def test_task_without_a_policy_says_what_to_give() -> None:
+def test_task_without_a_policy_says_what_to_give():
     with pytest.raises(InputError, match="first behavior is a policy"):
         RobotEnv({"scenario": "bundled:paper"})
 
 
-def test_unknown_task_has_the_nearest_name() -> None:
+def test_unknown_task_has_the_nearest_name():
     with pytest.raises(InputError, match="hangout"):
         RobotEnv("hangot")
 
 
-def test_picture_of_a_life_shows_the_scores() -> None:
+def test_picture_of_a_life_shows_the_scores():
     pytest.importorskip("matplotlib")
     from fleet2d.learning.gym.pictures import life_figure
 

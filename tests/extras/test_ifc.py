@@ -115,7 +115,7 @@ def flat(schema: str = "IFC4", spaces: bool = True) -> Model:
     return model
 
 
-def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path: Path) -> None:
+def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path):
     model = flat()
     model.add("IfcFurnishingElement", (0.5, 2, 2, 3), "Sideboard", storey="Up", z=(0, 0.9))
     model.add("IfcFurnishingElement", (4, 2, 5, 3), "Table", storey="Up", z=(0, 0.75))
@@ -126,9 +126,7 @@ def test_furniture_is_as_high_above_its_storey_as_the_model_says(tmp_path: Path)
 
 
 @pytest.mark.parametrize("schema", ["IFC4", "IFC4X3"])
-def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
-    tmp_path: Path, schema: str
-) -> None:
+def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(tmp_path, schema):
     plan = Ifc(path=flat(schema).write(tmp_path), level="Ground").load()
 
     assert [("Kitchen", "kitchen"), ("Schlafzimmer", "bedroom")] == [
@@ -144,7 +142,7 @@ def test_spaces_doors_windows_and_furniture_of_the_ground_floor_become_a_home(
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
 
 
-def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_path: Path) -> None:
+def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_path):
     path = flat().write(tmp_path)
     walls_only = Ifc(path=flat(spaces=False).write(tmp_path), level="Ground").load()
 
@@ -158,7 +156,7 @@ def test_a_storey_can_be_named_and_without_spaces_walls_enclose_the_home(tmp_pat
         Ifc(path=path, level="Roof").load()
 
 
-def test_damaged_and_empty_models_are_refused(tmp_path: Path) -> None:
+def test_damaged_and_empty_models_are_refused(tmp_path):
     whole = flat().write(tmp_path).read_text()
     for text, reason in (
         ("hello", "no header ISO-10303-21"),
@@ -170,7 +168,7 @@ def test_damaged_and_empty_models_are_refused(tmp_path: Path) -> None:
             load_floorplan(tmp_path / "bad.ifc")
 
 
-def test_elements_without_geometry_are_noted(tmp_path: Path) -> None:
+def test_elements_without_geometry_are_noted(tmp_path):
     from ifcopenshell.api import root
 
     model = flat()
@@ -181,7 +179,7 @@ def test_elements_without_geometry_are_noted(tmp_path: Path) -> None:
     assert "elements without a geometry, which are left out: 1" in notes
 
 
-def test_text_in_another_encoding_is_no_obstacle(tmp_path: Path) -> None:
+def test_text_in_another_encoding_is_no_obstacle(tmp_path):
     path = flat().write(tmp_path)
     plan = load_floorplan(path)
     path.write_bytes(
@@ -221,7 +219,7 @@ def variation(k: int, folder: Path) -> tuple[Path, int, bool]:
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
-def test_models_of_any_storeys_language_and_turn_are_the_home(tmp_path: Path, k: int) -> None:
+def test_models_of_any_storeys_language_and_turn_are_the_home(tmp_path, k):
     path, storeys, is_open = variation(k, tmp_path)
 
     plan = load_floorplan(path)
@@ -230,7 +228,7 @@ def test_models_of_any_storeys_language_and_turn_are_the_home(tmp_path: Path, k:
     assert not any("there are walls" in note for note in plan.notes)
 
 
-def test_a_whole_house_is_side_by_side_and_its_stairs_are_a_portal(tmp_path: Path) -> None:
+def test_a_whole_house_is_side_by_side_and_its_stairs_are_a_portal(tmp_path):
     model = flat()
     model.add("IfcStair", (5, 0.5, 6, 3.5), z=(0, 2.8))
     plan = load_floorplan(model.write(tmp_path))
@@ -241,7 +239,7 @@ def test_a_whole_house_is_side_by_side_and_its_stairs_are_a_portal(tmp_path: Pat
     assert 11.5e6 == pytest.approx(takes_us, rel=0.01)  # 16.5 treads of 17 cm in 0.7 s each
 
 
-def test_an_opening_without_a_door_is_a_way_and_one_above_a_sill_is_none(tmp_path: Path) -> None:
+def test_an_opening_without_a_door_is_a_way_and_one_above_a_sill_is_none(tmp_path):
     ways = {}
     for z in ((0.0, 2.2), (0.9, 2.2)):
         model = Model({"Ground": 0.0})

@@ -1,6 +1,5 @@
 """Networks in ONNX files: the shipped one gives the same beliefs, and wrong files are named."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,7 +73,7 @@ def beliefs(model: Any) -> Any:
     return np.array(run.arrow("rtp")["share"].to_pylist())
 
 
-def test_the_shipped_network_as_onnx_has_the_same_beliefs(tmp_path: Path) -> None:
+def test_the_shipped_network_as_onnx_has_the_same_beliefs(tmp_path):
     (tmp_path / "own.onnx").write_bytes(shipped())
 
     trusting = shipped_weights()._replace(trust=np.ones(TRUSTS))
@@ -86,7 +85,7 @@ def test_the_shipped_network_as_onnx_has_the_same_beliefs(tmp_path: Path) -> Non
     assert np.abs(own - learned).max() < 1e-4
 
 
-def test_other_files_and_other_inputs_are_refused(tmp_path: Path) -> None:
+def test_other_files_and_other_inputs_are_refused(tmp_path):
     foreign = tmp_path / "foreign.onnx"
     foreign.write_bytes(b"no model")
     with pytest.raises(Fleet2DError, match="is no ONNX model"):
@@ -98,7 +97,7 @@ def test_other_files_and_other_inputs_are_refused(tmp_path: Path) -> None:
         beliefs({"type": "onnx", "file": str(other)})
 
 
-def test_an_output_of_another_shape_is_named(tmp_path: Path) -> None:
+def test_an_output_of_another_shape_is_named(tmp_path):
     file = tmp_path / "wide.onnx"
     nodes = [
         onnx.helper.make_node("Relu", ["places"], ["unused"]),

@@ -34,7 +34,7 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_cubicasa_layout_has_its_rooms_and_doors(tmp_path: Path) -> None:
+def test_cubicasa_layout_has_its_rooms_and_doors(tmp_path):
     plan = load_floorplan(write(tmp_path, CUBICASA))
 
     areas = {room.name: room.area_m2 for room in plan.rooms}
@@ -46,7 +46,7 @@ def test_cubicasa_layout_has_its_rooms_and_doors(tmp_path: Path) -> None:
     assert "a unit is taken for 0.01 m, by the width of 1 doors" in plan.notes[0]
 
 
-def test_layers_of_inkscape_with_walls_as_lines(tmp_path: Path) -> None:
+def test_layers_of_inkscape_with_walls_as_lines(tmp_path):
     drawing = f"""{HEAD}<g inkscape:label="Outer walls" id="layer1">
       <path id="path7" style="fill:none" d="M0,0 H800 V400 H0 Z"/><path fill="none" d="M400,0 V150 M400,240 V400"/></g>
       <g inkscape:label="furniture"><circle cx="100" cy="100" r="40"/></g></svg>"""
@@ -69,12 +69,12 @@ def test_layers_of_inkscape_with_walls_as_lines(tmp_path: Path) -> None:
         (HEAD + "<g class='Wall'><path d='M0,0 L nan,5'/></g></svg>", "named like walls|damaged"),
     ],
 )
-def test_what_is_no_plan_is_refused(tmp_path: Path, text: str, problem: str) -> None:
+def test_what_is_no_plan_is_refused(tmp_path, text, problem):
     with pytest.raises(FloorPlanError, match=problem):
         load_floorplan(write(tmp_path, text))
 
 
-def test_one_sees_through_windows_between_rooms(tmp_path: Path) -> None:
+def test_one_sees_through_windows_between_rooms(tmp_path):
     inner = CUBICASA.replace(
         '<g class="Door',
         '<g class="Window"><polygon points="500,250 520,250 520,380 500,380"/></g><g class="Door',
@@ -124,7 +124,7 @@ def rooms_of(k: int, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
-def test_drawings_of_any_scale_language_and_naming_are_the_home(tmp_path: Path, k: int) -> None:
+def test_drawings_of_any_scale_language_and_naming_are_the_home(tmp_path, k):
     path = rooms_of(k, tmp_path)
 
     plan = load_floorplan(path, scale=1 / (100.0, 50.0, 37.8)[k % 3])
@@ -132,7 +132,7 @@ def test_drawings_of_any_scale_language_and_naming_are_the_home(tmp_path: Path, 
     check(plan, small_home(k), slack=0.02)
 
 
-def test_the_hole_of_a_wall_is_no_wall(tmp_path: Path) -> None:
+def test_the_hole_of_a_wall_is_no_wall(tmp_path):
     """Walls as one shape whose outlines are its holes, as drawing programs join them."""
     path = tmp_path / "plan.svg"
     path.write_text(

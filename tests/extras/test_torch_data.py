@@ -15,11 +15,11 @@ torch = pytest.importorskip("torch", reason="torch isn't installed")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     return make(tmp_path_factory.mktemp("data") / "small").root
 
 
-def test_workers_share_the_windows(folder: Path) -> None:
+def test_workers_share_the_windows(folder):
     from torch.utils.data import DataLoader
 
     import fleet2d
@@ -35,7 +35,7 @@ def test_workers_share_the_windows(folder: Path) -> None:
     assert loaded[0]["features"].shape[0] == loaded[0]["places"].shape[0]
 
 
-def test_shuffled_windows_are_the_same_ones_in_another_order(folder: Path) -> None:
+def test_shuffled_windows_are_the_same_ones_in_another_order(folder):
     import fleet2d
     from fleet2d.learning.datasets.torch_data import torch_windows
 
@@ -50,7 +50,7 @@ def test_shuffled_windows_are_the_same_ones_in_another_order(folder: Path) -> No
     assert sorted(plain) == sorted(shuffled)
 
 
-def test_fresh_windows_have_no_end_and_other_people() -> None:
+def test_fresh_windows_have_no_end_and_other_people():
     from fleet2d.learning.datasets.torch_data import fresh_windows
 
     first, other = (
@@ -65,9 +65,7 @@ def test_fresh_windows_have_no_end_and_other_people() -> None:
     assert first != other
 
 
-def test_a_recurrent_reference_is_trained_and_scored(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_recurrent_reference_is_trained_and_scored(folder, monkeypatch, capsys):
     benchmark = Path(__file__).parents[2] / "benchmarks" / "gru.py"
     monkeypatch.setattr("sys.argv", ["gru.py", str(folder), "--epochs", "3"])
     made = runpy.run_path(str(benchmark), run_name="__main__")
@@ -84,7 +82,7 @@ def test_a_recurrent_reference_is_trained_and_scored(
     assert torch.allclose(alone[0], both[0, : len(one.places), : alone.shape[2]], atol=1e-5)
 
 
-def test_the_hubs_library_loads_each_table(folder: Path, tmp_path: Path) -> None:
+def test_the_hubs_library_loads_each_table(folder, tmp_path):
     hub = pytest.importorskip("datasets", reason="datasets isn't installed")
 
     labels = hub.load_dataset(str(folder), "labels", cache_dir=str(tmp_path))

@@ -71,9 +71,7 @@ def without(plan: FloorPlan, parts: list[Polygon], shape: Polygon, kept: I64) ->
 
 @quick
 @given(st.lists(box_of_floor, max_size=8), st.sampled_from([BODY_RADIUS, THIN_RADIUS]))
-def test_furniture_is_refused_where_it_cuts_the_whole_space(
-    boxes: list[Box], radius: float
-) -> None:
+def test_furniture_is_refused_where_it_cuts_the_whole_space(boxes, radius):
     plan = two_rooms()
     expected = exact_space(plan, [], radius)
     space = BodySpace(plan, radius, obstacles_among(plan, [], radius), expected)
@@ -95,7 +93,7 @@ def test_furniture_is_refused_where_it_cuts_the_whole_space(
 
 
 @pytest.mark.parametrize("radius", RADII)
-def test_boxes_grow_as_polygons_do(radius: float) -> None:
+def test_boxes_grow_as_polygons_do(radius):
     boxes = np.array([[0, 0, 64, 640], [2, 4, 2, 4], [-640, 64, 1280, 66]])
     polygons = [shapely.box(*box) for box in boxes.tolist()]
 
@@ -108,9 +106,7 @@ def test_boxes_grow_as_polygons_do(radius: float) -> None:
 
 @quick
 @given(st.lists(box_of_floor, max_size=6), st.sampled_from(RADII))
-def test_furniture_that_cuts_nothing_leaves_every_part_of_a_space_whole(
-    boxes: list[Box], radius: float
-) -> None:
+def test_furniture_that_cuts_nothing_leaves_every_part_of_a_space_whole(boxes, radius):
     plan = two_rooms()
     bed = stand_furniture("bed", (2.0, 2.0))
     things = [replace(bed, footprint=footprint(*box)) for box in boxes]
@@ -123,7 +119,7 @@ def test_furniture_that_cuts_nothing_leaves_every_part_of_a_space_whole(
             assert 1 >= shapely.contains(before, inside).sum()
 
 
-def test_furniture_that_divides_a_room_cuts_it_at_every_radius() -> None:
+def test_furniture_that_divides_a_room_cuts_it_at_every_radius():
     plan = one_room("bedroom")
     bed = replace(stand_furniture("bed", (2, 2)), footprint=shapely.box(2, 0, 2.5, 4))
     across = lattice_footprint(plan, bed)
@@ -138,9 +134,7 @@ def test_furniture_that_divides_a_room_cuts_it_at_every_radius() -> None:
 
 @quick
 @given(st.lists(box_of_floor, max_size=6))
-def test_home_is_whole_only_if_no_body_has_a_second_large_space(
-    boxes: list[Box],
-) -> None:
+def test_home_is_whole_only_if_no_body_has_a_second_large_space(boxes):
     plan = one_room("bedroom")
     unit = plan.lattice.units_per_m
     bed = stand_furniture("bed", (2.0, 2.0))
@@ -154,7 +148,7 @@ def test_home_is_whole_only_if_no_body_has_a_second_large_space(
             assert 1 >= sum(space.area > CUT_OFF_M2 * unit**2 for space in spaces)
 
 
-def test_home_is_whole_unless_furniture_divides_it_or_a_wall_is_slanted() -> None:
+def test_home_is_whole_unless_furniture_divides_it_or_a_wall_is_slanted():
     plan = one_room("bedroom")
     bed = replace(stand_furniture("bed", (2, 2)), footprint=shapely.box(2, 0, 2.5, 4))
     across = lattice_footprint(plan, bed)

@@ -1,7 +1,5 @@
 """Routes of least cost, which keep away from walls and out of no-go areas."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -20,7 +18,6 @@ from fleet2d.floorplan.costmap import (
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.layers import LayerSettings
 from fleet2d.floorplan.plan import FloorPlan
-from fleet2d.floorplan.space import Space
 from fleet2d.kernels import line_of_sight, locate
 
 HALL = FloorPlan.build(
@@ -29,7 +26,7 @@ HALL = FloorPlan.build(
 
 
 @pytest.fixture(scope="module")
-def space() -> Space:
+def space():
     return Home(HALL).space(0.15)
 
 
@@ -42,7 +39,7 @@ def at(plan: FloorPlan, x: float, y: float) -> tuple[int, int]:
     return point[0], point[1]
 
 
-def test_cost_falls_from_walls_to_nothing_at_the_clearance() -> None:
+def test_cost_falls_from_walls_to_nothing_at_the_clearance():
     costs = costs_of(HALL, CostmapSettings(clearance=0.5, wall_cost=200, no_go="ignore"))
     row = [
         int(costs[HALL.lattice.cell_of(*at(HALL, x, 2.0))])
@@ -56,14 +53,14 @@ def test_cost_falls_from_walls_to_nothing_at_the_clearance() -> None:
 
 
 @pytest.mark.parametrize(("no_go", "inside"), [("forbid", -1), ("cost", 500), ("ignore", 0)])
-def test_no_go_areas_are_what_the_settings_say(no_go: str, inside: int) -> None:
+def test_no_go_areas_are_what_the_settings_say(no_go, inside):
     costs = costs_of(HALL, CostmapSettings(no_go=no_go, no_go_cost=500))  # type: ignore[arg-type]
 
     assert inside == costs[HALL.lattice.cell_of(*at(HALL, 3.0, 2.0))]
     assert 1600 + 100 == pytest.approx(cells_within(HALL, HALL.no_go).sum(), abs=100)
 
 
-def test_route_avoids_or_crosses_a_no_go_area_by_the_settings(space: Space) -> None:
+def test_route_avoids_or_crosses_a_no_go_area_by_the_settings(space):
     a, b = at(HALL, 1.0, 2.0), at(HALL, 5.0, 2.0)
     area = HALL.no_go[0]
     ways = {}
@@ -78,7 +75,7 @@ def test_route_avoids_or_crosses_a_no_go_area_by_the_settings(space: Space) -> N
     assert ways["cost"].length > 4.3
 
 
-def test_goal_in_a_forbidden_area_is_out_of_reach_and_a_start_there_is_left(space: Space) -> None:
+def test_goal_in_a_forbidden_area_is_out_of_reach_and_a_start_there_is_left(space):
     costs = costs_of(HALL, CostmapSettings())
     inside, outside = at(HALL, 3.0, 2.1), at(HALL, 1.0, 2.0)
 
@@ -90,7 +87,7 @@ def test_goal_in_a_forbidden_area_is_out_of_reach_and_a_start_there_is_left(spac
     assert route_by_cost(space, np.full(costs.shape, -1), outside, outside) is None
 
 
-def test_route_without_costs_is_nearly_the_shortest(shared_data: Path) -> None:
+def test_route_without_costs_is_nearly_the_shortest(shared_data):
     plan = fleet2d.load_floorplan(flat_path())
     space = Home(plan).space(0.15)
     free = np.zeros(plan.free.shape, np.int64)
@@ -107,7 +104,7 @@ def test_route_without_costs_is_nearly_the_shortest(shared_data: Path) -> None:
     assert worst < 1.06
 
 
-def test_route_stays_in_the_space_and_is_cheaper_than_the_shortest() -> None:
+def test_route_stays_in_the_space_and_is_cheaper_than_the_shortest():
     plan = fleet2d.load_floorplan(flat_path())
     space = Home(plan).space(0.15)
     costs = costs_of(plan, CostmapSettings(clearance=0.6, wall_cost=400))
@@ -134,7 +131,7 @@ def test_route_stays_in_the_space_and_is_cheaper_than_the_shortest() -> None:
     assert cheaper > 5
 
 
-def test_goal_outside_the_space_has_no_route(space: Space) -> None:
+def test_goal_outside_the_space_has_no_route(space):
     costs = costs_of(HALL, CostmapSettings(no_go="ignore"))
 
     assert route_by_cost(space, costs, at(HALL, 1, 2), at(HALL, 5.99, 2)) is None
@@ -149,9 +146,7 @@ def test_goal_outside_the_space_has_no_route(space: Space) -> None:
         ({"no_go": "maybe"}, "no_go"),
     ],
 )
-def test_wrong_settings_are_an_error_that_names_the_key(
-    settings: dict[str, object], why: str
-) -> None:
+def test_wrong_settings_are_an_error_that_names_the_key(settings, why):
     with pytest.raises(InputError, match=f"floorplan.costmap.{why}"):
         fleet2d.load_scenario("bundled:paper", floorplan={"type": "bundled", "costmap": settings})
 
@@ -180,7 +175,7 @@ def flooded(open_cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_costed_space_equals_a_search_over_its_cells(seed: int) -> None:
+def test_costed_space_equals_a_search_over_its_cells(seed):
     plan = fleet2d.load_floorplan(flat_path())
     base = Home(plan).space(0.15)
     rng = np.random.default_rng(seed)
@@ -209,7 +204,7 @@ def test_costed_space_equals_a_search_over_its_cells(seed: int) -> None:
             assert (start, goal) == (tuple(way[0].tolist()), tuple(way[-1].tolist()))
 
 
-def test_costed_space_is_new_only_when_costs_change() -> None:
+def test_costed_space_is_new_only_when_costs_change():
     home = Home(fleet2d.load_floorplan(flat_path()))
     base = home.space(0.15)
     assert home.costed(base) is base
@@ -224,7 +219,7 @@ def test_costed_space_is_new_only_when_costs_change() -> None:
     assert 2 == home.costs_version
 
 
-def test_furniture_costs_as_walls_do() -> None:
+def test_furniture_costs_as_walls_do():
     settings = CostmapSettings(clearance=0.5, wall_cost=200, no_go="ignore")
     costs = costs_of(HALL, settings, [shapely.box(2.5, 1.5, 3.5, 2.5)])
     beside, farther, far = (

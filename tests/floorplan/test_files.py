@@ -1,6 +1,6 @@
 """Fields of floor plan files: each error names its place, the value and what is expected."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import pytest
 from pydantic import BaseModel, TypeAdapter
@@ -49,14 +49,14 @@ SQUARE = [[0, 0], [1, 0], [1, 1]]
         ({"corners": [[*SQUARE[:2], *SQUARE[:2]]]}, "corners[0] has 2 different points"),
     ],
 )
-def test_wrong_value_is_refused_with_its_place(change: dict[str, Any], message: str) -> None:
+def test_wrong_value_is_refused_with_its_place(change, message):
     with pytest.raises(FloorPlanError) as caught:
         validate(SHELF, {"name": "shelf", **change})
 
     assert message in str(caught.value)
 
 
-def test_missing_key_and_what_is_no_object_are_refused() -> None:
+def test_missing_key_and_what_is_no_object_are_refused():
     with pytest.raises(FloorPlanError, match=r"^shelves\[2\] has no key 'name'$"):
         validate(SHELF, {}, "shelves[2]")
     with pytest.raises(FloorPlanError, match="is not an object with the keys name, level"):
@@ -78,19 +78,19 @@ class House(BaseModel):
         ([], "the plan is []: an object is expected"),
     ],
 )
-def test_missing_key_is_refused_beside_unknown_ones(content: object, message: str) -> None:
+def test_missing_key_is_refused_beside_unknown_ones(content, message):
     with pytest.raises(FloorPlanError) as caught:
         validate(TypeAdapter(House), content)
 
     assert message == str(caught.value)
 
 
-def test_only_the_first_wrong_item_of_a_long_list_is_an_error() -> None:
+def test_only_the_first_wrong_item_of_a_long_list_is_an_error():
     with pytest.raises(FloorPlanError, match=r"^path\[1\] is \[0\]"):
         validate(TypeAdapter(Listed[Point]), [[0, 0], *[[0]] * 100_000], "path")
 
 
-def test_ring_has_no_repeated_corners_and_no_tiny_coordinates() -> None:
+def test_ring_has_no_repeated_corners_and_no_tiny_coordinates():
     ring = [[0, 1e-300], [0, 0], [1, 0], [1, 0], [1, 1], [0, 0]]
 
     assert [(0, 0), (1, 0), (1, 1)] == validate(TypeAdapter(Ring), ring)

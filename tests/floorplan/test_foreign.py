@@ -2,7 +2,6 @@ import gzip
 import io
 import json
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -56,7 +55,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_file_of_another_program_is_named_with_what_to_do(tmp_path: Path, name: str) -> None:
+def test_file_of_another_program_is_named_with_what_to_do(tmp_path, name):
     content, kind, advice = FILES[name]
     (tmp_path / name).write_bytes(content)
 
@@ -68,30 +67,28 @@ def test_file_of_another_program_is_named_with_what_to_do(tmp_path: Path, name: 
     assert name in str(caught.value)
 
 
-def test_picture_of_another_kind_is_named(tmp_path: Path) -> None:
+def test_picture_of_another_kind_is_named(tmp_path):
     (tmp_path / "plan.png").write_bytes(b"RIFF\x10\0\0\0WEBPVP8 ")
 
     with pytest.raises(FloorPlanError, match="is a WebP picture"):
         load_floorplan(tmp_path / "plan.png", resolution=0.05)
 
 
-def test_text_that_is_no_known_format_is_said_to_be_no_json(tmp_path: Path) -> None:
+def test_text_that_is_no_known_format_is_said_to_be_no_json(tmp_path):
     (tmp_path / "plan.json").write_text("hello")
 
     with pytest.raises(FloorPlanError, match="is not JSON: Expecting value in line 1"):
         load_floorplan(tmp_path / "plan.json")
 
 
-def test_pictures_of_a_few_pixels_are_refused(tmp_path: Path) -> None:
+def test_pictures_of_a_few_pixels_are_refused(tmp_path):
     (tmp_path / "map.pgm").write_bytes(b"P5\n4 4\n255\n" + bytes(16))
 
     with pytest.raises(FloorPlanError, match="without its scale"):
         load_floorplan(tmp_path / "map.pgm")
 
 
-def test_validate_names_files_of_other_programs_too(
-    tmp_path: Path,
-) -> None:
+def test_validate_names_files_of_other_programs_too(tmp_path):
     (tmp_path / "house.rvt").write_bytes(FILES["house.rvt"][0])
 
     assert is_floorplan(tmp_path / "house.rvt")

@@ -98,7 +98,7 @@ def plan_of(path: Path) -> FloorPlan:
 
 
 @pytest.mark.slow
-def test_every_plan_of_houseexpo_is_furnished_without_harm(shared_data: Path) -> None:
+def test_every_plan_of_houseexpo_is_furnished_without_harm(shared_data):
     paths = plan_files(shared_data)
     pieces = 0
     for path in paths:
@@ -109,7 +109,7 @@ def test_every_plan_of_houseexpo_is_furnished_without_harm(shared_data: Path) ->
 
 
 @pytest.mark.slow
-def test_maps_of_robots_are_furnished_without_harm(shared_data: Path) -> None:
+def test_maps_of_robots_are_furnished_without_harm(shared_data):
     paths = [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")]
     assert 6 == len(paths)
     for path in some(paths, 3):
@@ -119,7 +119,7 @@ def test_maps_of_robots_are_furnished_without_harm(shared_data: Path) -> None:
 @pytest.mark.slow
 @quick
 @given(homes(), st.sampled_from(sorted(RULES)), st.integers(0, 3))
-def test_furniture_never_disconnects_a_home(polygons: list[Polygon], kind: str, seed: int) -> None:
+def test_furniture_never_disconnects_a_home(polygons, kind, seed):
     # A cell of the strategies' raster is a metre and a half here.
     free = shapely.union_all([shapely.transform(p, lambda xy: xy * 1.5 / 64) for p in polygons])
     x0, y0, x1, y1 = free.bounds
@@ -134,7 +134,7 @@ def test_furniture_never_disconnects_a_home(polygons: list[Polygon], kind: str, 
 
 
 @pytest.mark.slow
-def test_same_seed_gives_the_same_furniture_and_another_one_other() -> None:
+def test_same_seed_gives_the_same_furniture_and_another_one_other():
     plan = load_floorplan()
     bare = FloorPlan.build("bare", plan.free_space, plan.regions)
 
@@ -165,18 +165,18 @@ def types(plan: FloorPlan) -> Counter[str]:
         ("storage", {"shelf"}),
     ],
 )
-def test_room_gets_what_its_type_needs(kind: str, expected: set[str]) -> None:
+def test_room_gets_what_its_type_needs(kind, expected):
     assert expected <= set(types(furnish(one_room(kind))))
 
 
-def test_kitchen_stands_along_one_wall() -> None:
+def test_kitchen_stands_along_one_wall():
     plan = furnish(one_room("kitchen"))
     line = [of_type(plan, kind)[0] for kind in ("stove", "sink", "fridge")]
 
     assert 1 == len({thing.heading for thing in line})
 
 
-def test_bed_has_its_head_at_a_wall_and_the_tv_faces_the_sofa() -> None:
+def test_bed_has_its_head_at_a_wall_and_the_tv_faces_the_sofa():
     (bed,) = of_type(furnish(one_room("bedroom")), "bed")
     back = np.array(bed.footprint.centroid.coords[0]) - 1.0 * np.array(
         [np.cos(bed.heading), np.sin(bed.heading)]
@@ -187,7 +187,7 @@ def test_bed_has_its_head_at_a_wall_and_the_tv_faces_the_sofa() -> None:
     assert pytest.approx(np.pi) == abs(sofa.heading - tv.heading)
 
 
-def test_group_for_a_corner_is_tried_at_both_ends_of_every_wall() -> None:
+def test_group_for_a_corner_is_tried_at_both_ends_of_every_wall():
     plan = one_room("bedroom")
     whole = whole_cells(plan)
     nothing = np.zeros_like(whole)
@@ -208,7 +208,7 @@ def test_group_for_a_corner_is_tried_at_both_ends_of_every_wall() -> None:
     assert {(turn, side) for turn in range(4) for side in ("left", "right")} == corners
 
 
-def test_group_is_tried_only_where_it_and_the_floor_before_it_are_empty() -> None:
+def test_group_is_tried_only_where_it_and_the_floor_before_it_are_empty():
     plan = one_room("bedroom")
     whole = whole_cells(plan)
     before_walls = cells_before_walls(whole, plan.lattice.cell)
@@ -226,16 +226,16 @@ def test_group_is_tried_only_where_it_and_the_floor_before_it_are_empty() -> Non
     assert {0, 1, 2, 3} == turns
 
 
-def test_rooms_of_no_known_type_get_nothing() -> None:
+def test_rooms_of_no_known_type_get_nothing():
     assert () == furnish(one_room("unknown")).objects
     assert () == furnish(one_room("yoga_studio")).objects
 
 
-def test_every_rule_is_for_a_type_of_the_vocabulary() -> None:
+def test_every_rule_is_for_a_type_of_the_vocabulary():
     assert set(RULES) <= set(PRIORITY)
 
 
-def test_density_zero_leaves_only_essential_furniture() -> None:
+def test_density_zero_leaves_only_essential_furniture():
     plan = one_room("bedroom")
 
     assert {"bed", "nightstand", "wardrobe"} == set(types(furnish(plan, density=0)))
@@ -243,12 +243,12 @@ def test_density_zero_leaves_only_essential_furniture() -> None:
 
 
 @pytest.mark.parametrize("density", [-1, float("nan"), 11])
-def test_density_out_of_range_is_refused(density: float) -> None:
+def test_density_out_of_range_is_refused(density):
     with pytest.raises(FloorPlanError, match="density"):
         furnish(one_room("bedroom"), density=density)
 
 
-def test_room_that_holds_something_is_left_alone() -> None:
+def test_room_that_holds_something_is_left_alone():
     box = shapely.box(0, 0, 5, 4)
     chair = stand_furniture("chair", (1.0, 1.0))
     region = LabelledRegion(("bedroom",), box)
@@ -258,7 +258,7 @@ def test_room_that_holds_something_is_left_alone() -> None:
 
 
 @pytest.mark.slow
-def test_nothing_stands_before_a_doorway() -> None:
+def test_nothing_stands_before_a_doorway():
     rooms = [shapely.box(0, 0, 4, 4), shapely.box(4.15, 0, 8, 4)]
     gap = shapely.box(4, 1.5, 4.15, 2.4)
     regions = [
@@ -274,7 +274,7 @@ def test_nothing_stands_before_a_doorway() -> None:
         assert shapely.intersection(before, covered).area < 1e-9
 
 
-def test_charger_stands_once_in_the_hallway() -> None:
+def test_charger_stands_once_in_the_hallway():
     plan = furnish(load_floorplan())
     chargers = of_type(plan, "charger")
 
@@ -285,6 +285,6 @@ def test_charger_stands_once_in_the_hallway() -> None:
     assert "hallway" == room.type
 
 
-def test_home_that_nobody_fits_into_is_refused() -> None:
+def test_home_that_nobody_fits_into_is_refused():
     with pytest.raises(FloorPlanError, match="fits nowhere"):
         furnish(one_room("bedroom", 0.4, 3.0))

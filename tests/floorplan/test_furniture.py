@@ -5,7 +5,7 @@ import math
 import pytest
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.furniture import FURNITURE, Furniture, furniture_type, stand_furniture
+from fleet2d.floorplan.furniture import FURNITURE, furniture_type, stand_furniture
 from fleet2d.kernels import QUARTER, TURN
 
 TALL = {"wardrobe", "fridge", "bookshelf", "shelf"}
@@ -13,18 +13,18 @@ ALL = [pytest.param(furniture, id=furniture.type) for furniture in FURNITURE.val
 
 
 @pytest.mark.parametrize("furniture", ALL)
-def test_sizes_of_a_type_are_a_range_of_a_home(furniture: Furniture) -> None:
+def test_sizes_of_a_type_are_a_range_of_a_home(furniture):
     for low, high in (furniture.width, furniture.depth):
         assert 0.2 <= low <= high <= 2.5
 
 
 @pytest.mark.parametrize("furniture", ALL)
-def test_only_what_is_tall_blocks_sight(furniture: Furniture) -> None:
+def test_only_what_is_tall_blocks_sight(furniture):
     assert (furniture.type in TALL) == (furniture.blocks == "sight")
 
 
 @pytest.mark.parametrize("furniture", ALL)
-def test_people_stand_beside_blocking_furniture_and_not_in_it(furniture: Furniture) -> None:
+def test_people_stand_beside_blocking_furniture_and_not_in_it(furniture):
     thing = stand_furniture(furniture.type, (0.0, 0.0))
     x0, y0, x1, y1 = thing.footprint.bounds
     for use in thing.uses:
@@ -45,15 +45,13 @@ def test_people_stand_beside_blocking_furniture_and_not_in_it(furniture: Furnitu
         (3 * QUARTER, 3.0, 1.35, 0.5 * math.pi),
     ],
 )
-def test_person_stands_before_a_stove_and_faces_it(
-    heading: int, x: float, y: float, facing: float
-) -> None:
+def test_person_stands_before_a_stove_and_faces_it(heading, x, y, facing):
     (use,) = stand_furniture("stove", (3.0, 2.0), heading, (0.6, 0.6)).uses
 
     assert pytest.approx((x, y, facing)) == (use.x, use.y, use.heading)
 
 
-def test_turning_a_piece_turns_its_footprint_and_its_uses() -> None:
+def test_turning_a_piece_turns_its_footprint_and_its_uses():
     plain = stand_furniture("bed", (0.0, 0.0), 0, (1.6, 2.0))
     turned = stand_furniture("bed", (0.0, 0.0), TURN // 8, (1.6, 2.0))
 
@@ -65,7 +63,7 @@ def test_turning_a_piece_turns_its_footprint_and_its_uses() -> None:
     assert pytest.approx(math.pi / 4) == turned.heading
 
 
-def test_bed_lies_from_the_pillow_along_its_heading() -> None:
+def test_bed_lies_from_the_pillow_along_its_heading():
     bed = stand_furniture("bed", (0.0, 0.0), 0, (1.6, 2.0))
 
     assert (-1.0, -0.8, 1.0, 0.8) == pytest.approx(bed.footprint.bounds)
@@ -73,6 +71,6 @@ def test_bed_lies_from_the_pillow_along_its_heading() -> None:
     assert [0.4, -0.4] == pytest.approx([use.y for use in bed.uses[:2]])
 
 
-def test_unknown_type_is_refused_with_the_nearest_name() -> None:
+def test_unknown_type_is_refused_with_the_nearest_name():
     with pytest.raises(FloorPlanError, match=r"'sofaa'.*did you mean 'sofa'"):
         furniture_type("sofaa")

@@ -27,7 +27,7 @@ def way_out(home: Home, part: int = 0, radius: float = 0.2) -> tuple[float, floa
     return x, y
 
 
-def test_space_is_built_once_for_each_radius() -> None:
+def test_space_is_built_once_for_each_radius():
     home = home_with()
 
     assert home.space(0.2) is home.space(0.2)
@@ -35,7 +35,7 @@ def test_space_is_built_once_for_each_radius() -> None:
     assert (0.2, 0.25) == (home.space(0.2).radius, home.space(0.25).radius)
 
 
-def test_copy_of_a_home_changes_on_its_own_and_shares_its_spaces() -> None:
+def test_copy_of_a_home_changes_on_its_own_and_shares_its_spaces():
     home = home_with(("kitchen", 0, 3), ("bedroom", 3, 6))
     twin = copy.deepcopy(home)
     twin.use_room_as(twin.rooms[0], "Office")
@@ -44,13 +44,13 @@ def test_copy_of_a_home_changes_on_its_own_and_shares_its_spaces() -> None:
     assert ("office", "kitchen") == (twin.rooms[0].type, home.rooms[0].type)
 
 
-def test_rooms_are_those_of_the_plan() -> None:
+def test_rooms_are_those_of_the_plan():
     home = home_with(("kitchen", 0, 3), ("bedroom", 3, 6))
 
     assert home.plan.rooms == home.rooms
 
 
-def test_way_out_is_the_free_place_nearest_to_the_entrance() -> None:
+def test_way_out_is_the_free_place_nearest_to_the_entrance():
     x, y = way_out(home_with(("hallway", 0, 2), entrance=(5.99, 1.5)))
 
     assert abs(x - 5.775) < 0.05
@@ -66,15 +66,13 @@ def test_way_out_is_the_free_place_nearest_to_the_entrance() -> None:
         ([("bedroom", 0, 4), ("bathroom", 4, 6)], (0, 4)),
     ],
 )
-def test_way_out_without_an_entrance_is_in_the_likeliest_room(
-    labels: list[tuple[str, float, float]], expected: tuple[float, float]
-) -> None:
+def test_way_out_without_an_entrance_is_in_the_likeliest_room(labels, expected):
     x, _ = way_out(home_with(*labels))
 
     assert expected[0] < x < expected[1]
 
 
-def test_way_out_of_another_part_is_in_that_part() -> None:
+def test_way_out_of_another_part_is_in_that_part():
     """The hallway is out of reach from there, and so is the entrance."""
     for entrance in (None, (0.5, 1.5)):
         x, _ = way_out(home_with(("hallway", 0, 2), ("bedroom", 8, 10), entrance=entrance), part=1)
@@ -82,7 +80,7 @@ def test_way_out_of_another_part_is_in_that_part() -> None:
         assert 8 < x < 10
 
 
-def test_way_out_of_another_part_is_in_a_reachable_room() -> None:
+def test_way_out_of_another_part_is_in_a_reachable_room():
     """Not where that part comes nearest to the hallway, which is out of reach."""
     home = home_with(("hallway", 0, 2), ("bedroom", 8, 9), ("kitchen", 9, 10))
 
@@ -91,7 +89,7 @@ def test_way_out_of_another_part_is_in_a_reachable_room() -> None:
     assert 9 < x < 10
 
 
-def test_way_out_of_a_missing_part_is_an_error() -> None:
+def test_way_out_of_a_missing_part_is_an_error():
     home = home_with(("kitchen", 0, 2))
 
     with pytest.raises(PlacementError, match=r"a body of radius 0\.2 m fits nowhere in test home"):

@@ -16,12 +16,12 @@ from fleet2d.floorplan.home import HomeChange, HomeChanges
         ({"shut": "a", "to": (1, 2)}, "'move' and 'to' go together"),
     ],
 )
-def test_change_that_is_not_exactly_one_is_refused(settings: dict, words: str) -> None:
+def test_change_that_is_not_exactly_one_is_refused(settings, words):
     with pytest.raises(ValidationError, match=words):
         HomeChange(**settings)
 
 
-def test_changes_become_columns_in_their_order() -> None:
+def test_changes_become_columns_in_their_order():
     output = HomeChanges([HomeChange(open="b"), HomeChange(move="sofa_1", to=(1, 2))])
     columns = output.to_columns()
     assert ["open", "move"] == columns["change"].tolist()

@@ -50,7 +50,7 @@ def sees(home: Home, eye: tuple[float, float], point: tuple[float, float]) -> bo
 
 @settings(max_examples=examples(40))
 @given(st.integers(0, 2**32))
-def test_views_through_glass_are_those_of_the_slow_reference(seed: int) -> None:
+def test_views_through_glass_are_those_of_the_slow_reference(seed):
     rng = np.random.default_rng(seed)
     low, high = sorted(rng.integers(4, 70, 2).tolist())
     pane = shapely.box(3.9, low / 20, 4.3, (high + 4) / 20)
@@ -67,7 +67,7 @@ def test_views_through_glass_are_those_of_the_slow_reference(seed: int) -> None:
     assert visible(walls_of(snapped), eye, np.array(points)).tolist() == seen.tolist()
 
 
-def test_robot_sees_through_glass_and_drives_round_it() -> None:
+def test_robot_sees_through_glass_and_drives_round_it():
     home = Home(office())
     space, point_at = home.space(0.15), home.plan.lattice.point_at
     route = space.route(point_at((3.0, 2.0)), point_at((5.0, 2.0)))
@@ -79,7 +79,7 @@ def test_robot_sees_through_glass_and_drives_round_it() -> None:
     assert [] == list(home.plan.notes)
 
 
-def test_glass_without_a_door_joins_no_rooms() -> None:
+def test_glass_without_a_door_joins_no_rooms():
     home = Home(office(WITHOUT_DOOR))
 
     assert sees(home, (1, 2), (7, 2))
@@ -88,7 +88,7 @@ def test_glass_without_a_door_joins_no_rooms() -> None:
     assert () == home.plan.doorways
 
 
-def test_bodies_on_the_border_of_their_space_get_inside_on_their_side_of_the_glass() -> None:
+def test_bodies_on_the_border_of_their_space_get_inside_on_their_side_of_the_glass():
     home = Home(office(WITHOUT_DOOR))
     (x, y), beyond = (home.plan.lattice.point_at(at) for at in ((3.9, 2), (4.3, 2)))
 
@@ -97,7 +97,7 @@ def test_bodies_on_the_border_of_their_space_get_inside_on_their_side_of_the_gla
     assert home.space(0.15).walls is home.barriers
 
 
-def test_person_behind_glass_is_observed_and_behind_a_wall_is_not(tmp_path: Path) -> None:
+def test_person_behind_glass_is_observed_and_behind_a_wall_is_not(tmp_path):
     def sightings(plan: FloorPlan) -> int:
         run = fleet2d.run(
             {
@@ -120,7 +120,7 @@ def test_person_behind_glass_is_observed_and_behind_a_wall_is_not(tmp_path: Path
     assert 0 == sightings(office(WITHOUT_DOOR, glass=[]))
 
 
-def test_tall_furniture_and_shut_doors_hide_what_is_behind_them() -> None:
+def test_tall_furniture_and_shut_doors_hide_what_is_behind_them():
     plan = office(objects=[PlacedObject("", "wardrobe", shapely.box(3.2, 0.9, 3.8, 3.1), "sight")])
     behind = Home(plan, plan.doorways)
     assert not sees(behind, (1, 2), (7, 2))
@@ -131,7 +131,7 @@ def test_tall_furniture_and_shut_doors_hide_what_is_behind_them() -> None:
     assert sees(home, (1, 2), (7, 2))
 
 
-def test_outer_windows_and_glass_off_walls_are_noted_and_change_nothing() -> None:
+def test_outer_windows_and_glass_off_walls_are_noted_and_change_nothing():
     outer, free = shapely.box(8, 1, 8.2, 2), shapely.box(1, 1, 1.2, 2)
     plan = office(glass=[outer, free])
 
@@ -142,7 +142,7 @@ def test_outer_windows_and_glass_off_walls_are_noted_and_change_nothing() -> Non
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
 
 
-def test_glass_is_stored_read_and_part_of_the_content(tmp_path: Path) -> None:
+def test_glass_is_stored_read_and_part_of_the_content(tmp_path):
     plan = office()
     save_floorplan(plan, tmp_path / "own.json")
     save_floorplan(plan, tmp_path / "plan.geojson")

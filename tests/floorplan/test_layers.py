@@ -2,7 +2,6 @@
 
 import copy
 from datetime import timedelta
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,11 +14,11 @@ from fleet2d.floorplan.layers import Layers
 
 
 @pytest.fixture
-def home() -> Home:
+def home():
     return Home(fleet2d.load_floorplan(flat_path()))
 
 
-def test_layer_holds_its_fill_and_written_values(home: Home) -> None:
+def test_layer_holds_its_fill_and_written_values(home):
     layer = home.layers.add("dust", "float32", fill=1.5, unit="g", description="on the floor")
     layer.values[home.plan.free] += 1
     layer.set_at(1.0, 3.0, 7)
@@ -37,11 +36,11 @@ def test_layer_holds_its_fill_and_written_values(home: Home) -> None:
     ("dtype", "expected"),
     [("bool", "bool"), ("int", "int64"), ("float", "float64"), ("uint8", "uint8")],
 )
-def test_dtypes_are_those_of_numpy(home: Home, dtype: Any, expected: str) -> None:
+def test_dtypes_are_those_of_numpy(home, dtype, expected):
     assert expected == str(home.layers.add("a", dtype, fill=1).values.dtype)
 
 
-def test_same_layer_may_be_added_twice_and_another_of_its_name_not(home: Home) -> None:
+def test_same_layer_may_be_added_twice_and_another_of_its_name_not(home):
     first = home.layers.add("dust", "int", unit="g")
 
     assert first is home.layers.add("dust", "int", unit="g")
@@ -68,13 +67,13 @@ def test_same_layer_may_be_added_twice_and_another_of_its_name_not(home: Home) -
         (("costmap",), "the run maintains itself"),
     ],
 )
-def test_wrong_layer_is_refused(home: Home, arguments: Any, why: str) -> None:
+def test_wrong_layer_is_refused(home, arguments, why):
     with pytest.raises(ComponentError, match=why):
         home.layers.add(*arguments)
     assert 0 == len(home.layers)
 
 
-def test_unknown_layer_names_the_known_ones_and_how_to_add_it(home: Home) -> None:
+def test_unknown_layer_names_the_known_ones_and_how_to_add_it(home):
     home.layers.add("dust")
 
     with pytest.raises(ComponentError, match=r"did you mean 'dust'.*There are: dust; add it by"):
@@ -86,7 +85,7 @@ def test_unknown_layer_names_the_known_ones_and_how_to_add_it(home: Home) -> Non
     assert "dusk" not in home.layers
 
 
-def test_copies_of_a_home_have_layers_of_their_own(home: Home) -> None:
+def test_copies_of_a_home_have_layers_of_their_own(home):
     layer = home.layers.add("dust")
     state = {"home": home, "layer": layer, "values": layer.values}
     twin = copy.deepcopy(state)
@@ -98,7 +97,7 @@ def test_copies_of_a_home_have_layers_of_their_own(home: Home) -> None:
     assert twin["values"].all()
 
 
-def test_layers_of_the_run_are_read_only(home: Home) -> None:
+def test_layers_of_the_run_are_read_only(home):
     from fleet2d.floorplan.layers import LayerSettings
 
     layers = Layers(home.plan)
@@ -126,7 +125,7 @@ def test_layers_of_the_run_are_read_only(home: Home) -> None:
         ({"costmap": {"unit": "m"}}, "leave out 'unit'"),
     ],
 )
-def test_wrong_layer_of_a_scenario_is_an_error_that_says_where(layers: Any, why: str) -> None:
+def test_wrong_layer_of_a_scenario_is_an_error_that_says_where(layers, why):
     content = scenario()
     content["floorplan"]["layers"] = layers
     with pytest.raises(InputError, match=why) as caught:
@@ -134,7 +133,7 @@ def test_wrong_layer_of_a_scenario_is_an_error_that_says_where(layers: Any, why:
     assert "floorplan.layers" in str(caught.value)
 
 
-def test_scenario_with_layers_comes_back_from_what_is_stored() -> None:
+def test_scenario_with_layers_comes_back_from_what_is_stored():
     content = scenario()
     content["floorplan"] |= {"layers": {"dust": {"every": "1 h"}}, "costmap": {"clearance": 0.3}}
     loaded = fleet2d.load_scenario(content)

@@ -28,14 +28,14 @@ MAPS = {
 }
 
 
-def test_table_has_every_map(shared_data: Path) -> None:
+def test_table_has_every_map(shared_data):
     maps = {*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")}
 
     assert {str(path.relative_to(shared_data)) for path in maps} == set(MAPS)
 
 
 @pytest.mark.parametrize("file", MAPS)
-def test_map_has_the_rooms_and_the_area_of_its_file(shared_data: Path, file: str) -> None:
+def test_map_has_the_rooms_and_the_area_of_its_file(shared_data, file):
     rooms, area = MAPS[file]
 
     plan = load_floorplan(shared_data / file)
@@ -47,7 +47,7 @@ def test_map_has_the_rooms_and_the_area_of_its_file(shared_data: Path, file: str
 
 
 @pytest.mark.parametrize("file", [file for file, (rooms, _) in MAPS.items() if rooms])
-def test_named_rooms_have_the_areas_that_the_file_states(shared_data: Path, file: str) -> None:
+def test_named_rooms_have_the_areas_that_the_file_states(shared_data, file):
     """But for the few pixels that are wall, too."""
     content = json.loads((shared_data / file).read_text())
     segments = [layer for layer in content["layers"] if layer["type"] == "segment"]
@@ -62,7 +62,7 @@ def test_named_rooms_have_the_areas_that_the_file_states(shared_data: Path, file
     assert {name: pytest.approx(area / 100**2, abs=0.011) for name, area in stated.items()} == areas
 
 
-def test_synthetic_home_is_named_by_its_seed() -> None:
+def test_synthetic_home_is_named_by_its_seed():
     assert Synthetic(seed=7).load() == load_floorplan("synthetic:7")
     with pytest.raises(FloorPlanError, match=r"synthetic:0, synthetic:1"):
         load_floorplan("synthetic7")
@@ -81,9 +81,7 @@ def test_synthetic_home_is_named_by_its_seed() -> None:
         ("absent.png", None, "{type: image, path: absent.png}"),
     ],
 )
-def test_advice_about_a_file_named_as_a_type_follows_its_content(
-    name: str, content: str | None, advice: str, tmp_path: Path
-) -> None:
+def test_advice_about_a_file_named_as_a_type_follows_its_content(name, content, advice, tmp_path):
     if content is not None:
         (tmp_path / name).write_text(content)
 
@@ -91,13 +89,11 @@ def test_advice_about_a_file_named_as_a_type_follows_its_content(
 
 
 @pytest.mark.parametrize("name", ["synthetic", "acme.home", "mine.json:Home"])
-def test_no_advice_about_what_names_no_file(name: str) -> None:
+def test_no_advice_about_what_names_no_file(name):
     assert advise_type(name) == ""
 
 
-def test_format_is_recognized_by_the_ending_that_it_declares(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_format_is_recognized_by_the_ending_that_it_declares(tmp_path, monkeypatch):
     class Drawn(FloorPlanSource):
         """A home, named in a file that is neither JSON nor YAML."""
 

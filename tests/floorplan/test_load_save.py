@@ -6,7 +6,6 @@ import jsonschema
 import pytest
 import shapely
 import yaml
-from tests.scenes import Cli
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import is_floorplan, load_floorplan, save_floorplan
@@ -44,7 +43,7 @@ def full_plan(name: str = "no: 1 – Küche") -> FloorPlan:
 
 
 @pytest.mark.parametrize("suffix", ["json", "yaml", "yml", "geojson"])
-def test_plan_with_everything_comes_back_equal(tmp_path: Path, suffix: str) -> None:
+def test_plan_with_everything_comes_back_equal(tmp_path, suffix):
     plan = full_plan()
     assert plan.doorways
     assert plan.objects
@@ -66,7 +65,7 @@ def test_plan_with_everything_comes_back_equal(tmp_path: Path, suffix: str) -> N
 
 
 @pytest.mark.parametrize("suffix", ["json", "yaml", "geojson"])
-def test_storeys_stairs_and_panes_come_back(tmp_path: Path, suffix: str) -> None:
+def test_storeys_stairs_and_panes_come_back(tmp_path, suffix):
     ground = shapely.difference(shapely.box(0, 0, 6, 5), shapely.box(3, 0, 3.1, 3))
     storeys = shapely.MultiPolygon([ground, shapely.box(8, 0, 12, 5)])
     pane = shapely.box(2.95, 0.5, 3.15, 1.5)
@@ -105,9 +104,7 @@ def test_storeys_stairs_and_panes_come_back(tmp_path: Path, suffix: str) -> None
         "houseexpo/2deaa98eb0b9b31ea2a5b1c4a0a9e4b2.json",
     ],
 )
-def test_real_plan_comes_back_equal(
-    shared_data: Path, tmp_path: Path, file: str, suffix: str
-) -> None:
+def test_real_plan_comes_back_equal(shared_data, tmp_path, file, suffix):
     path = shared_data / file
     if not path.exists():
         (path, *_) = sorted(path.parent.glob(f"{path.name[:8]}*.json"))
@@ -121,7 +118,7 @@ def test_real_plan_comes_back_equal(
 # --- Files ------------------------------------------------------------------------------------------
 
 
-def test_file_that_exists_is_left_alone(tmp_path: Path) -> None:
+def test_file_that_exists_is_left_alone(tmp_path):
     path = tmp_path / "plan.json"
     path.write_text("mine")
 
@@ -131,9 +128,7 @@ def test_file_that_exists_is_left_alone(tmp_path: Path) -> None:
     assert "mine" == path.read_text()
 
 
-def test_file_that_appears_while_a_plan_is_written_is_left_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_that_appears_while_a_plan_is_written_is_left_alone(tmp_path, monkeypatch):
     path = tmp_path / "plan.json"
     path.write_text("mine")
     monkeypatch.setattr(Path, "exists", lambda _: False)  # as it was before
@@ -144,7 +139,7 @@ def test_file_that_appears_while_a_plan_is_written_is_left_alone(
     assert "mine" == path.read_text()
 
 
-def test_link_that_leads_nowhere_is_left_alone(tmp_path: Path) -> None:
+def test_link_that_leads_nowhere_is_left_alone(tmp_path):
     path = tmp_path / "plan.json"
     path.symlink_to(tmp_path / "disk" / "plan.json")
 
@@ -154,9 +149,7 @@ def test_link_that_leads_nowhere_is_left_alone(tmp_path: Path) -> None:
     assert path.is_symlink()
 
 
-def test_nothing_is_left_where_the_disk_is_full(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_left_where_the_disk_is_full(tmp_path, monkeypatch):
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -168,14 +161,14 @@ def test_nothing_is_left_where_the_disk_is_full(
 
 
 @pytest.mark.parametrize("name", ["plan.txt", "plan", "no/folder/plan.json"])
-def test_file_that_can_not_be_is_refused_and_nothing_is_left(tmp_path: Path, name: str) -> None:
+def test_file_that_can_not_be_is_refused_and_nothing_is_left(tmp_path, name):
     with pytest.raises(FloorPlanError, match=r"can't be written|a floor plan is written as"):
         save_floorplan(full_plan(), tmp_path / name)
 
     assert [] == list(tmp_path.iterdir())
 
 
-def test_name_that_no_file_can_hold_is_refused_and_nothing_is_left(tmp_path: Path) -> None:
+def test_name_that_no_file_can_hold_is_refused_and_nothing_is_left(tmp_path):
     plan = full_plan("\ud800")
 
     save_floorplan(plan, tmp_path / "plan.json")
@@ -193,14 +186,14 @@ def fits(content: Any) -> bool:
     return bool(validator(native_schema()).is_valid(content))
 
 
-def test_schema_is_one_and_what_is_written_fits() -> None:
+def test_schema_is_one_and_what_is_written_fits():
     jsonschema.validators.validator_for(native_schema()).check_schema(native_schema())
     assert fits(native_document(full_plan()))
     for path in HOMES.glob("*.json"):
         assert fits(json.loads(path.read_text())), path.name
 
 
-def test_example_in_the_docs_fits_the_schema() -> None:
+def test_example_in_the_docs_fits_the_schema():
     page = (Path(__file__).parents[2] / "docs/how-to/floorplans.md").read_text(encoding="utf-8")
     example = page.partition("```yaml title=own.yaml\n")[2].partition("```")[0]
 
@@ -225,9 +218,7 @@ def test_example_in_the_docs_fits_the_schema() -> None:
         {"entrance": [1]},
     ],
 )
-def test_what_the_reader_refuses_does_not_fit_the_schema(
-    tmp_path: Path, change: dict[str, Any]
-) -> None:
+def test_what_the_reader_refuses_does_not_fit_the_schema(tmp_path, change):
     content = {**native_document(full_plan("flat")), **change}
     path = tmp_path / "plan.yaml"
     path.write_text(yaml.safe_dump(content))
@@ -241,9 +232,7 @@ def test_what_the_reader_refuses_does_not_fit_the_schema(
 
 
 @pytest.mark.slow
-def test_convert_writes_a_plan_of_any_format_and_says_its_notes(
-    fleet2d: Cli, shared_data: Path
-) -> None:
+def test_convert_writes_a_plan_of_any_format_and_says_its_notes(fleet2d, shared_data):
     path = shared_data / "valetudo" / "roborock_s6_segments.json"
 
     code, out, err = fleet2d("convert", path, "home.yaml")
@@ -257,7 +246,7 @@ def test_convert_writes_a_plan_of_any_format_and_says_its_notes(
     assert load_floorplan(path) == load_floorplan("home.geojson")
 
 
-def test_convert_never_overwrites(fleet2d: Cli) -> None:
+def test_convert_never_overwrites(fleet2d):
     Path("home.json").write_text("mine")
 
     code, _, err = fleet2d("convert", "family_home", "home.json")
@@ -267,7 +256,7 @@ def test_convert_never_overwrites(fleet2d: Cli) -> None:
     assert "mine" == Path("home.json").read_text()
 
 
-def test_convert_of_a_picture_takes_its_resolution(fleet2d: Cli) -> None:
+def test_convert_of_a_picture_takes_its_resolution(fleet2d):
     rows = b"\x00" * 60 + (b"\x00" * 10 + b"\xff" * 40 + b"\x00" * 10) * 40 + b"\x00" * 60
     Path("flat.pgm").write_bytes(b"P5\n60 42\n255\n" + rows)
 
@@ -276,13 +265,13 @@ def test_convert_of_a_picture_takes_its_resolution(fleet2d: Cli) -> None:
     assert 16 == pytest.approx(load_floorplan("flat.json").area_m2)
 
 
-def test_schema_of_a_floor_plan_is_printed(fleet2d: Cli) -> None:
+def test_schema_of_a_floor_plan_is_printed(fleet2d):
     code, out, err = fleet2d("components", "--schema", "floorplan")
 
     assert (0, "", native_schema()) == (code, err, json.loads(out))
 
 
-def test_picture_of_a_plan_stays_in_the_folder_whatever_its_name(fleet2d: Cli) -> None:
+def test_picture_of_a_plan_stays_in_the_folder_whatever_its_name(fleet2d):
     pytest.importorskip("matplotlib")
     save_floorplan(full_plan("../a/b"), "plan.json")
 
@@ -303,9 +292,7 @@ def test_picture_of_a_plan_stays_in_the_folder_whatever_its_name(fleet2d: Cli) -
         ("a.txt", "", False),
     ],
 )
-def test_plans_are_told_from_scenarios(
-    tmp_path: Path, name: str, content: str, expected: bool
-) -> None:
+def test_plans_are_told_from_scenarios(tmp_path, name, content, expected):
     (tmp_path / name).write_text(content)
 
     assert expected == is_floorplan(tmp_path / name)

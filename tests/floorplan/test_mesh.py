@@ -1,7 +1,5 @@
 """Meshes of outlines: their triangles fill the free space, also where outlines touch."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -50,11 +48,11 @@ def check_mesh(mesh: Mesh, polygons: list[Polygon]) -> None:
 
 @quick
 @given(homes())
-def test_mesh_fills_the_free_space_and_ends_at_walls(polygons: list[Polygon]) -> None:
+def test_mesh_fills_the_free_space_and_ends_at_walls(polygons):
     check_mesh(home_of(polygons).mesh, polygons)
 
 
-def test_mesh_fills_real_homes(shared_data: Path) -> None:
+def test_mesh_fills_real_homes(shared_data):
     for home in all_homes(shared_data):
         assert 2 * sum(polygon.area for polygon in home.polygons) == doubled_area(home.mesh)
 
@@ -83,14 +81,14 @@ def test_mesh_fills_real_homes(shared_data: Path) -> None:
         ),
     ],
 )
-def test_rings_may_touch(holes: list[list[tuple[int, int]]]) -> None:
+def test_rings_may_touch(holes):
     polygon = Polygon(SQUARE, holes)
     assert polygon.is_valid
 
     check_mesh(build_mesh([polygon], 10, 10), [polygon])
 
 
-def test_map_in_which_geos_fails_has_a_mesh_all_the_same() -> None:
+def test_map_in_which_geos_fails_has_a_mesh_all_the_same():
     """A 70th of maps with thin slanted walls couldn't be read: "Unable to find a convex corner"."""
     pixels = np.ones((14, 18), np.bool_)
     for row, columns in ((6, "9-12"), (9, "9 17"), (10, "10-16"), (11, "11-14"), (12, "8-10")):
@@ -104,7 +102,7 @@ def test_map_in_which_geos_fails_has_a_mesh_all_the_same() -> None:
     check_mesh(build_mesh([polygon], 18, 14), [polygon])
 
 
-def test_polygons_may_touch_at_corners_and_at_walls() -> None:
+def test_polygons_may_touch_at_corners_and_at_walls():
     polygons = [
         shapely.box(0, 0, 200, 200),
         shapely.box(200, 200, 400, 400),
@@ -114,7 +112,7 @@ def test_polygons_may_touch_at_corners_and_at_walls() -> None:
     check_mesh(build_mesh(polygons, 10, 10), polygons)
 
 
-def test_corners_in_the_middle_of_a_straight_wall_are_dropped() -> None:
+def test_corners_in_the_middle_of_a_straight_wall_are_dropped():
     mesh = build_mesh([Polygon([(0, 0), (320, 0), (640, 0), (640, 640), (0, 640)])], 10, 10)
 
     assert [[0, 0], [0, 640], [640, 0], [640, 640]] == mesh.vertices.tolist()
@@ -136,12 +134,12 @@ def test_corners_in_the_middle_of_a_straight_wall_are_dropped() -> None:
         ([shapely.box(0, 0, 200, 200), shapely.box(50, 50, 100, 100)], "overlap"),
     ],
 )
-def test_wrong_free_space_is_an_error(polygons: list[Polygon], message: str) -> None:
+def test_wrong_free_space_is_an_error(polygons, message):
     with pytest.raises(FloorPlanError, match=message):
         build_mesh(polygons, 10, 10)
 
 
-def test_snapping_moves_walls_to_even_units_within_the_tolerance(shared_data: Path) -> None:
+def test_snapping_moves_walls_to_even_units_within_the_tolerance(shared_data):
     rng = np.random.default_rng(5)
     for _ in range(50):
         outline = shapely.convex_hull(shapely.multipoints(rng.uniform(0, 3000, (9, 2))))
@@ -154,7 +152,7 @@ def test_snapping_moves_walls_to_even_units_within_the_tolerance(shared_data: Pa
         assert abs(snapped.area_change) <= snapped.tolerance
 
 
-def test_snapping_drops_what_is_thinner_than_the_lattice() -> None:
+def test_snapping_drops_what_is_thinner_than_the_lattice():
     rooms = shapely.union_all(
         [
             shapely.box(0, 0, 100, 100),
@@ -170,7 +168,7 @@ def test_snapping_drops_what_is_thinner_than_the_lattice() -> None:
     assert snap_polygon(shapely.box(0, 0, 500, 0.3)).polygons == []
 
 
-def test_crossed_outline_becomes_its_loops_and_changes_the_area() -> None:
+def test_crossed_outline_becomes_its_loops_and_changes_the_area():
     bow_tie = Polygon([(0, 0), (200, 200), (200, 0), (0, 200)])
 
     snapped = snap_polygon(bow_tie)

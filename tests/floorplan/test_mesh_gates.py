@@ -1,7 +1,5 @@
 """Doors in the mesh: shut ones are walls to every kernel, open ones are nothing."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -77,14 +75,12 @@ def compare(home: Home, rng: np.random.Generator, doors: int, eyes: int, points:
 
 @given(homes(), seeds())
 @settings(max_examples=examples(60))
-def test_sight_past_shut_and_open_doors_equals_a_test_of_every_wall(
-    polygons: list[shapely.Polygon], seed: int
-) -> None:
+def test_sight_past_shut_and_open_doors_equals_a_test_of_every_wall(polygons, seed):
     assume(len(home_of(polygons).cells))
     compare(home_of(polygons), np.random.default_rng(seed), doors=4, eyes=3, points=40)
 
 
-def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data: Path) -> None:
+def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data):
     rng = np.random.default_rng(5)
     pairs = [compare(home, rng, doors=6, eyes=4, points=250) for home in all_homes(shared_data)]
     assert sum(pairs) > 800 * len(pairs)
@@ -92,9 +88,7 @@ def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data: Path) -> No
 
 @given(homes(), seeds())
 @settings(max_examples=examples(40))
-def test_regions_follow_doors_as_single_sight_lines_do(
-    polygons: list[shapely.Polygon], seed: int
-) -> None:
+def test_regions_follow_doors_as_single_sight_lines_do(polygons, seed):
     rng = np.random.default_rng(seed)
     assume(len(home_of(polygons).cells))
     home, segments = with_doors(home_of(polygons), rng, 3)
@@ -109,25 +103,25 @@ def test_regions_follow_doors_as_single_sight_lines_do(
     assert inside == truth(home, segments, eye, points).tolist()
 
 
-def test_all_doors_open_is_the_home_without_doors() -> None:
+def test_all_doors_open_is_the_home_without_doors():
     gates = Gates(build_mesh(ROOM, 10, 10, MIDDLE), [MIDDLE])
     assert gates.shut(()) is gates.mesh
     assert (gates.mesh.neighbors >= 0).sum() == 2 * (len(gates.mesh.triangles) - 1)
 
 
-def test_shutting_changes_nothing_of_the_mesh_that_was_handed_out() -> None:
+def test_shutting_changes_nothing_of_the_mesh_that_was_handed_out():
     gates = Gates(build_mesh(ROOM, 10, 10, MIDDLE), [MIDDLE])
     before = gates.mesh.neighbors.copy()
     assert (gates.shut({0}).neighbors != before).sum() == 2
     np.testing.assert_array_equal(before, gates.mesh.neighbors)
 
 
-def test_segment_that_ends_at_no_wall_is_refused() -> None:
+def test_segment_that_ends_at_no_wall_is_refused():
     with pytest.raises(FloorPlanError, match=r"ends at \(320, 300\)"):
         Gates(build_mesh(ROOM, 10, 10), [((320, 300), (0, 0))])
 
 
-def test_segment_through_a_wall_is_refused() -> None:
+def test_segment_through_a_wall_is_refused():
     room = [shapely.box(0, 0, 640, 640).difference(shapely.box(200, 0, 300, 400))]
     with pytest.raises(FloorPlanError, match="does not cross free space alone"):
         Gates(build_mesh(room, 10, 10, ((0, 100), (640, 100))), [((0, 100), (640, 100))])

@@ -59,7 +59,7 @@ def read(folder: Path, **content: Any) -> FloorPlan:
     return read_native(write(folder, {**PLAN, **content}))
 
 
-def test_plan_written_by_hand_is_read(tmp_path: Path) -> None:
+def test_plan_written_by_hand_is_read(tmp_path):
     hole = [[3, 1], [4, 1], [4, 2], [3, 2]]
     kitchen = {"type": "Kitchen", "polygon": [[0, 0], [2, 0], [2, 3], [0, 3]]}
 
@@ -79,7 +79,7 @@ def test_plan_written_by_hand_is_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cell", [0.05, 0.2, 1.0])
-def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: float) -> None:
+def test_every_plan_comes_back_equal(shared_data, tmp_path, cell):
     for path in plan_files(shared_data):
         if path.name.startswith("f1ac") and cell < 0.1:
             continue  # the largest takes seconds
@@ -92,7 +92,7 @@ def test_every_plan_comes_back_equal(shared_data: Path, tmp_path: Path, cell: fl
         assert plan.mesh.triangles.tolist() == again.mesh.triangles.tolist()
 
 
-def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
+def test_entrance_holes_names_and_labels_come_back(tmp_path):
     ring = shapely.difference(shapely.box(0, 0, 9, 7), shapely.Point(4, 3).buffer(1.2345))
     den = LabelledRegion(("office", "bedroom"), shapely.box(0, 0, 4, 7), "Ben's den", "office")
     plan = FloorPlan.build("ring", ring, [den], entrance=(0.1 + 0.2, 1 / 3))
@@ -154,16 +154,14 @@ def test_entrance_holes_names_and_labels_come_back(tmp_path: Path) -> None:
         ({"entrance": "door"}, 'entrance is "door": a list of 2 numbers'),
     ],
 )
-def test_what_is_no_plan_is_refused_with_the_place(
-    tmp_path: Path, change: dict[str, Any], message: str
-) -> None:
+def test_what_is_no_plan_is_refused_with_the_place(tmp_path, change, message):
     with pytest.raises(FloorPlanError, match=message) as caught:
         read(tmp_path, **change)
 
     assert str(tmp_path / "plan.json") in str(caught.value)
 
 
-def test_a_key_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+def test_a_key_that_is_there_twice_is_refused(tmp_path):
     path = tmp_path / "plan.json"
     path.write_text(json.dumps(PLAN)[:-1] + ', "version": 1}')
 
@@ -171,7 +169,7 @@ def test_a_key_that_is_there_twice_is_refused(tmp_path: Path) -> None:
         load_floorplan(path)
 
 
-def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:
+def test_yaml_and_json_are_the_same(tmp_path):
     content = {
         **PLAN,
         "objects": [{**BED, "uses": [{**USE, "posture": "lie"}]}],
@@ -187,7 +185,7 @@ def test_yaml_and_json_are_the_same(tmp_path: Path) -> None:
     assert [("bed_1", "lie")] == [(thing.name, thing.uses[0].posture) for thing in plan.objects]
 
 
-def test_doorways_that_a_file_leaves_out_are_searched(tmp_path: Path) -> None:
+def test_doorways_that_a_file_leaves_out_are_searched(tmp_path):
     """An empty list means that there are none."""
     pinched = [[0, 0], [3, 0], [3, 1], [3.1, 1], [3.1, 0], [6, 0], [6, 3], [3.1, 3], [3.1, 1.9]]
     pinched += [[3, 1.9], [3, 3], [0, 3]]
@@ -205,7 +203,7 @@ def test_doorways_that_a_file_leaves_out_are_searched(tmp_path: Path) -> None:
     assert none == read_native(write(tmp_path, native_document(none)))
 
 
-def test_native_and_bundled_are_found_by_name(tmp_path: Path) -> None:
+def test_native_and_bundled_are_found_by_name(tmp_path):
     source = Native.model_validate({"path": str(write(tmp_path, PLAN)), "cell": 0.1})
 
     assert 0.1 == source.load().lattice.cell
@@ -216,11 +214,11 @@ def test_native_and_bundled_are_found_by_name(tmp_path: Path) -> None:
 # --- The bundled home ---------------------------------------------------------------------------
 
 
-def test_bundled_names_are_the_files() -> None:
+def test_bundled_names_are_the_files():
     assert bundled_names() == sorted(get_args(Bundled.model_fields["name"].annotation))
 
 
-def test_family_home_has_the_size_of_the_papers_and_every_room() -> None:
+def test_family_home_has_the_size_of_the_papers_and_every_room():
     plan = Bundled().load()
 
     assert 184 <= plan.area_m2 <= 188
@@ -237,7 +235,7 @@ def test_family_home_has_the_size_of_the_papers_and_every_room() -> None:
 
 
 @pytest.mark.parametrize("cell", [0.05, 0.1])
-def test_family_home_lets_a_body_of_25_cm_into_every_room(cell: float) -> None:
+def test_family_home_lets_a_body_of_25_cm_into_every_room(cell):
     plan = Bundled(cell=cell).load()
     space = Space(plan, radius=0.25)
 
@@ -247,13 +245,13 @@ def test_family_home_lets_a_body_of_25_cm_into_every_room(cell: float) -> None:
     assert 0 == space.part_at(*plan.lattice.to_lattice(plan.entrance).tolist())
 
 
-def test_load_floorplan_tells_formats_by_content(tmp_path: Path) -> None:
+def test_load_floorplan_tells_formats_by_content(tmp_path):
     assert "family_home" == load_floorplan().name
     assert "flat" == load_floorplan(write(tmp_path, PLAN)).name
     assert 15.0 == pytest.approx(load_floorplan(write(tmp_path, {"verts": OUTLINE}), 0.1).area_m2)
 
 
-def test_load_floorplan_refuses_what_it_does_not_know(tmp_path: Path) -> None:
+def test_load_floorplan_refuses_what_it_does_not_know(tmp_path):
     with pytest.raises(FloorPlanError, match="not a floor plan that Fleet2D can read"):
         load_floorplan(write(tmp_path, {"walls": 3}))
     with pytest.raises(FloorPlanError, match="did you mean 'family_home'"):
@@ -277,7 +275,7 @@ def by_hand(folder: Path, free: Any, **keys: Any) -> FloorPlan:
     return read_native(write(folder, document))
 
 
-def test_rectangles_for_rooms_and_doorways_are_one_free_space(tmp_path: Path) -> None:
+def test_rectangles_for_rooms_and_doorways_are_one_free_space(tmp_path):
     rooms = [{"type": "kitchen", "polygon": KITCHEN}, {"type": "office", "polygon": OFFICE}]
 
     plan = by_hand(tmp_path, [KITCHEN, OFFICE, PASSAGE], rooms=rooms)
@@ -292,14 +290,14 @@ def test_rectangles_for_rooms_and_doorways_are_one_free_space(tmp_path: Path) ->
     assert () == plan.notes
 
 
-def test_free_space_may_be_one_outline_or_one_area(tmp_path: Path) -> None:
+def test_free_space_may_be_one_outline_or_one_area(tmp_path):
     plan = by_hand(tmp_path, KITCHEN)
 
     assert plan == by_hand(tmp_path, [KITCHEN]) == by_hand(tmp_path, [{"outline": KITCHEN}])
     assert plan.area_m2 == pytest.approx(12)
 
 
-def test_door_in_no_wall_says_which_corner_may_be_missing(tmp_path: Path) -> None:
+def test_door_in_no_wall_says_which_corner_may_be_missing(tmp_path):
     door = {"start": [4.1, 1], "end": [4.1, 1.9], "name": "office_door"}
     open_door = {"start": [2, 1], "end": [2, 1.9]}
 

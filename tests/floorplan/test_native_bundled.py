@@ -5,7 +5,7 @@ from fleet2d.floorplan.plan import FloorPlan
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_bundled_home_is_what_the_reader_with_checks_reads(name: str) -> None:
+def test_bundled_home_is_what_the_reader_with_checks_reads(name):
     """They are read without checks: a coordinate that isn't a float would be stored as it is."""
 
     def parts(plan: FloorPlan) -> str:

@@ -28,17 +28,17 @@ def thing(name: str, kind: str = "chair") -> PlacedObject:
     return PlacedObject(name, kind, shapely.box(0, 0, 0.5, 0.5))
 
 
-def test_objects_without_a_name_are_numbered_by_type_and_skip_own_names() -> None:
+def test_objects_without_a_name_are_numbered_by_type_and_skip_own_names():
     things = number_objects([thing(""), thing("chair_2"), thing(""), thing("", "bed")])
     assert ["chair_1", "chair_2", "chair_3", "bed_1"] == [o.name for o in things]
 
 
-def test_two_objects_of_one_name_are_refused() -> None:
+def test_two_objects_of_one_name_are_refused():
     with pytest.raises(FloorPlanError, match="two objects are named 'a'"):
         number_objects([thing("a"), thing("a")])
 
 
-def test_quarter_turn_is_exact() -> None:
+def test_quarter_turn_is_exact():
     sofa = move_object(SOFA, LATTICE, (5, 5), 90)
     assert (4.5, 4, 5.5, 6) == sofa.footprint.bounds
     (use,) = sofa.uses
@@ -47,18 +47,18 @@ def test_quarter_turn_is_exact() -> None:
 
 
 @given(st.floats(-360, 360), st.floats(1, 9), st.floats(1, 9))
-def test_moved_object_keeps_its_size_to_the_lattice(turn: float, x: float, y: float) -> None:
+def test_moved_object_keeps_its_size_to_the_lattice(turn, x, y):
     sofa = move_object(SOFA, LATTICE, (x, y), turn)
     assert sofa.footprint.area == pytest.approx(2, abs=0.01)
     assert sofa.footprint.centroid.x == pytest.approx(x, abs=0.002)
 
 
-def test_object_moved_back_is_where_it_was() -> None:
+def test_object_moved_back_is_where_it_was():
     back = move_object(move_object(SOFA, LATTICE, (5, 5), 180), LATTICE, (3, 2.5), 180)
     assert SOFA.footprint.equals(back.footprint)
 
 
-def test_descriptions_of_different_objects_differ() -> None:
+def test_descriptions_of_different_objects_differ():
     (use,) = SOFA.uses
     others = [
         move_object(SOFA, LATTICE, (5, 5)),

@@ -10,18 +10,18 @@ from fleet2d.floorplan.placed_objects import distinct_names, find_named, number_
 THINGS = [SimpleNamespace(name=name) for name in ("kitchen_1", "bedroom_1")]
 
 
-def test_numbers_skip_own_names_and_count_by_type() -> None:
+def test_numbers_skip_own_names_and_count_by_type():
     names = number_names([None, "bed_2", "", None], ["bed", "sofa", "bed", "sofa"], "object")
 
     assert ["bed_1", "bed_2", "bed_3", "sofa_1"] == names
 
 
-def test_two_of_one_name_are_refused() -> None:
+def test_two_of_one_name_are_refused():
     with pytest.raises(FloorPlanError, match="two rooms are named 'den': give each room its own"):
         number_names(["den", "den"], ["office", "office"], "room")
 
 
-def test_repeated_names_get_the_next_free_number_with_a_note() -> None:
+def test_repeated_names_get_the_next_free_number_with_a_note():
     notes: list[str] = []
 
     names = distinct_names(["Bath", "Bath", "Bath 2", None, "Bath", None], "rooms", notes)
@@ -30,7 +30,7 @@ def test_repeated_names_get_the_next_free_number_with_a_note() -> None:
     assert "several rooms are called Bath: one of them is Bath 3 here" == notes[0]
 
 
-def test_thing_is_found_by_name_or_refused_with_the_nearest() -> None:
+def test_thing_is_found_by_name_or_refused_with_the_nearest():
     assert THINGS[1] is find_named(THINGS, "bedroom_1", "flat", "room")
     with pytest.raises(PlacementError) as caught:
         find_named(THINGS, "kitchen", "flat", "room", PlacementError)

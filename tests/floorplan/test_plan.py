@@ -12,7 +12,7 @@ from fleet2d.floorplan.space import Space
 
 
 @pytest.fixture
-def flat() -> FloorPlan:
+def flat():
     """A kitchen and a bedroom with a wall of 20 cm and a door of 1 m between them."""
     rooms = [shapely.box(0, 0, 2, 3), shapely.box(2.2, 0, 5, 3), shapely.box(2, 1, 2.2, 2)]
     labels = [
@@ -22,7 +22,7 @@ def flat() -> FloorPlan:
     return FloorPlan.build("flat", shapely.union_all(rooms), labels, entrance=(0.5, 0.5))
 
 
-def test_build_gives_walls_cells_and_rooms(flat: FloorPlan) -> None:
+def test_build_gives_walls_cells_and_rooms(flat):
     assert 6.0 + 8.4 + 0.2 == pytest.approx(flat.area_m2)
     assert ["kitchen_1", "bedroom_1"] == [room.name for room in flat.rooms]
     assert [40 * 60 + 2 * 20, 56 * 60 + 2 * 20] == [room.cells for room in flat.rooms]
@@ -31,14 +31,14 @@ def test_build_gives_walls_cells_and_rooms(flat: FloorPlan) -> None:
     assert () == flat.notes
 
 
-def test_free_cells_are_those_with_their_centre_inside(flat: FloorPlan) -> None:
+def test_free_cells_are_those_with_their_centre_inside(flat):
     x, y = flat.lattice.centre_axes()
     inside = shapely.contains_xy(shapely.union_all(flat.polygons), *np.meshgrid(x, y))
 
     assert np.array_equal(inside, flat.free)
 
 
-def test_anchor_is_the_deepest_cell_lowest_row_then_column(flat: FloorPlan) -> None:
+def test_anchor_is_the_deepest_cell_lowest_row_then_column(flat):
     for room in flat.rooms:
         depth = squared_distance(flat.room_of_cell == room.index)
         row, column = np.argwhere(depth == depth.max())[0]
@@ -47,30 +47,30 @@ def test_anchor_is_the_deepest_cell_lowest_row_then_column(flat: FloorPlan) -> N
         assert expected == list(room.anchor_xy)
 
 
-def test_room_at_finds_rooms_and_nothing_in_walls_or_outside(flat: FloorPlan) -> None:
+def test_room_at_finds_rooms_and_nothing_in_walls_or_outside(flat):
     rooms = [flat.room_at(x, y) for x, y in [(1, 1), (2.05, 1.5), (4, 2)]]
 
     assert ["kitchen_1", "kitchen_1", "bedroom_1"] == [room.name if room else "" for room in rooms]
     assert [None] * 4 == [flat.room_at(*at) for at in [(2.1, 0.5), (-3, 1), (1, 1e6), (9, -9)]]
 
 
-def test_room_by_name_or_index(flat: FloorPlan) -> None:
+def test_room_by_name_or_index(flat):
     assert flat.room("bedroom_1") is flat.room(1)
 
 
-def test_room_of_another_name_is_refused_with_the_nearest(flat: FloorPlan) -> None:
+def test_room_of_another_name_is_refused_with_the_nearest(flat):
     with pytest.raises(FloorPlanError, match=r"did you mean 'bedroom_1'.*kitchen_1, bedroom_1"):
         flat.room("bedrom_1")
     with pytest.raises(FloorPlanError, match="its rooms are 0 to 1"):
         flat.room(2)
 
 
-def test_rooms_of_type_honours_every_label(flat: FloorPlan) -> None:
+def test_rooms_of_type_honours_every_label(flat):
     assert ("bedroom_1",) == tuple(room.name for room in flat.rooms_of_type("Office"))
     assert () == flat.rooms_of_type("gym")
 
 
-def test_plans_are_equal_by_content(flat: FloorPlan) -> None:
+def test_plans_are_equal_by_content(flat):
     again = FloorPlan.build("flat", shapely.box(0, 0, 5, 3), entrance=(0.5, 0.5))
     other = FloorPlan.build("flat", shapely.box(0, 0, 5, 3.1), entrance=(0.5, 0.5))
     start_elsewhere = shapely.Polygon([(5, 3), (0, 3), (0, 0), (5, 0)])
@@ -81,19 +81,19 @@ def test_plans_are_equal_by_content(flat: FloorPlan) -> None:
     assert again != again.named("house")
 
 
-def test_copies_are_the_plan_itself_and_pickles_equal_it(flat: FloorPlan) -> None:
+def test_copies_are_the_plan_itself_and_pickles_equal_it(flat):
     assert flat is copy.deepcopy(flat)
     assert flat is copy.copy(flat)
     assert flat == pickle.loads(pickle.dumps(flat))
 
 
-def test_arrays_of_a_plan_cannot_be_written(flat: FloorPlan) -> None:
+def test_arrays_of_a_plan_cannot_be_written(flat):
     for array in (flat.free, flat.room_of_cell):
         with pytest.raises(ValueError, match="read-only"):
             array[0, 0] = 1
 
 
-def test_holes_and_separate_parts_are_kept_and_noted() -> None:
+def test_holes_and_separate_parts_are_kept_and_noted():
     house = shapely.difference(shapely.box(0, 0, 6, 6), shapely.box(2, 2, 4, 4))
     plan = FloorPlan.build("estate", shapely.union(house, shapely.box(10, 0, 12, 2)))
 
@@ -103,7 +103,7 @@ def test_holes_and_separate_parts_are_kept_and_noted() -> None:
     assert plan.room_at(3, 3) is None
 
 
-def test_plan_too_thin_for_its_cells_is_refused_with_what_to_do() -> None:
+def test_plan_too_thin_for_its_cells_is_refused_with_what_to_do():
     """Known failure 7: coarse cells lost area without a word."""
     with pytest.raises(
         FloorPlanError, match=r"holds no cell of 1 m: choose a smaller floorplan\.cell"
@@ -116,12 +116,12 @@ def test_plan_too_thin_for_its_cells_is_refused_with_what_to_do() -> None:
 @pytest.mark.parametrize(
     "free", [shapely.Polygon(), shapely.Polygon([(0, 0), (1, 1), (2, 2)]), shapely.MultiPolygon()]
 )
-def test_plan_without_area_is_refused(free: shapely.Polygon) -> None:
+def test_plan_without_area_is_refused(free):
     with pytest.raises(FloorPlanError, match="encloses no area"):
         FloorPlan.build("line", free)
 
 
-def test_rounding_that_would_change_the_area_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rounding_that_would_change_the_area_is_refused(monkeypatch):
     """Known failure 7: an area that doesn't survive rounding is an error, not a surprise."""
     # No known outline snaps so badly, so snapping is replaced.
     import fleet2d.floorplan.mesh as module
@@ -138,7 +138,7 @@ def test_rounding_that_would_change_the_area_is_refused(monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("cell", [0.01, 0.03, 0.05, 0.1, 0.2, 0.5, 1.0])
-def test_area_of_a_slanted_plan_holds_at_any_cell_size(cell: float) -> None:
+def test_area_of_a_slanted_plan_holds_at_any_cell_size(cell):
     """Known failure 7: area stays within the stated tolerance, the perimeter times two units."""
     turned = shapely.affinity.rotate(shapely.box(0, 0, 8, 5), 23, origin=(0, 0))
 
@@ -147,7 +147,7 @@ def test_area_of_a_slanted_plan_holds_at_any_cell_size(cell: float) -> None:
     assert abs(plan.area_m2 - 40) <= 26 * 2 / plan.lattice.units_per_m
 
 
-def test_entrance_in_a_wall_is_refused_with_the_nearest_free_place() -> None:
+def test_entrance_in_a_wall_is_refused_with_the_nearest_free_place():
     """Known failure 11: a place in a wall is an error that says where free space is."""
     with pytest.raises(
         FloorPlanError, match=r"at \(-1, 2\) m is not in free space: .*\(0\.03, 1\.98\)"
@@ -155,18 +155,18 @@ def test_entrance_in_a_wall_is_refused_with_the_nearest_free_place() -> None:
         FloorPlan.build("flat", shapely.box(0, 0, 5, 3), entrance=(-1, 2))
 
 
-def test_nearest_free_of_a_free_place_is_its_cell(flat: FloorPlan) -> None:
+def test_nearest_free_of_a_free_place_is_its_cell(flat):
     x, y = flat.nearest_free(1.01, 1.01)
 
     assert (1.0258, 1.0258) == (round(x, 4), round(y, 4))
     assert flat.room_at(*flat.nearest_free(1e9, -1e9)) is flat.room("bedroom_1")
 
 
-def test_repr_says_what_plan_it_is(flat: FloorPlan) -> None:
+def test_repr_says_what_plan_it_is(flat):
     assert "<FloorPlan flat: 14.6 m2, 2 rooms, 104 x 64 cells of 0.05 m>" == repr(flat)
 
 
-def test_a_body_reaches_both_rooms_through_the_door(flat: FloorPlan) -> None:
+def test_a_body_reaches_both_rooms_through_the_door(flat):
     space = Space(flat, radius=0.25)
 
     assert 1 == space.parts

@@ -1,7 +1,6 @@
 """Homes that the runs of a process share: made once for each content, and read-only."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,12 @@ SHORT = "simulation.duration=6 h"
 
 
 @pytest.fixture(autouse=True)
-def empty_caches(monkeypatch: pytest.MonkeyPatch) -> None:
+def empty_caches(monkeypatch):
     monkeypatch.setattr(source, "PLAN_CACHE", Cache(source.CACHED_PLANS))
     monkeypatch.setattr(homes, "HOME_CACHE", Cache(homes.CACHED_HOMES))
 
 
-def test_value_used_least_recently_is_dropped() -> None:
+def test_value_used_least_recently_is_dropped():
     cache, calls = Cache(size=2), list[str]()
     for key in "abacb":
         cache.get(key, lambda key=key: calls.append(key))
@@ -32,7 +31,7 @@ def test_value_used_least_recently_is_dropped() -> None:
     assert len(cache) == 2
 
 
-def test_value_that_could_not_be_made_is_not_stored() -> None:
+def test_value_that_could_not_be_made_is_not_stored():
     cache = Cache(size=2)
     with pytest.raises(ZeroDivisionError):
         cache.get("a", lambda: 1 // 0)
@@ -40,7 +39,7 @@ def test_value_that_could_not_be_made_is_not_stored() -> None:
     assert cache.get("a", lambda: 5) == 5
 
 
-def test_cache_grows_and_never_shrinks() -> None:
+def test_cache_grows_and_never_shrinks():
     cache, calls = Cache(size=1), list[str]()
     cache.grow(2)
     cache.grow(1)
@@ -50,7 +49,7 @@ def test_cache_grows_and_never_shrinks() -> None:
     assert list("ab") == calls
 
 
-def test_second_run_shares_plan_spaces_and_ratings() -> None:
+def test_second_run_shares_plan_spaces_and_ratings():
     first, second = (fleet2d.Simulation("bundled:paper", SHORT, seed=seed) for seed in (4, 5))
     hangouts = [
         next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
@@ -65,7 +64,7 @@ def test_second_run_shares_plan_spaces_and_ratings() -> None:
     assert distances[0] is distances[1]
 
 
-def test_changed_file_is_read_anew(tmp_path: Path) -> None:
+def test_changed_file_is_read_anew(tmp_path):
     path = tmp_path / "home.json"
     content: dict[str, Any] = json.loads((HOMES / "family_home.json").read_text())
     path.write_text(json.dumps(content))
@@ -85,7 +84,7 @@ def test_changed_file_is_read_anew(tmp_path: Path) -> None:
     assert (first.name, changed.name) == ("family_home", "another")
 
 
-def test_shared_arrays_are_read_only() -> None:
+def test_shared_arrays_are_read_only():
     simulation = fleet2d.Simulation("bundled:paper", SHORT, seed=4)
     plan, space = simulation.home.plan, simulation.home.space(0.15)
     hangout: Any = next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
@@ -100,7 +99,7 @@ def test_shared_arrays_are_read_only() -> None:
     assert isinstance(plan.polygons, tuple)
 
 
-def test_run_is_the_same_whatever_ran_before_in_its_home() -> None:
+def test_run_is_the_same_whatever_ran_before_in_its_home():
     alone = fleet2d.run("bundled:paper", SHORT, seed=4).digest
     simulation = fleet2d.Simulation("bundled:paper", SHORT, seed=7)
     simulation.home.use_room_as(simulation.home.rooms[0], "office")
@@ -112,7 +111,7 @@ def test_run_is_the_same_whatever_ran_before_in_its_home() -> None:
     assert alone == fleet2d.run("bundled:paper", SHORT, seed=4).digest
 
 
-def test_equal_floor_plans_have_spaces_of_their_own() -> None:
+def test_equal_floor_plans_have_spaces_of_their_own():
     plans = [fleet2d.load_floorplan() for _ in range(2)]
     first, second = (fleet2d.Home(plan) for plan in plans)
 
@@ -121,9 +120,7 @@ def test_equal_floor_plans_have_spaces_of_their_own() -> None:
     assert first.space(0.15).plan is plans[0]
 
 
-def test_a_folder_shares_a_home_among_processes_and_changes_no_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_shares_a_home_among_processes_and_changes_no_run(tmp_path, monkeypatch):
     home = {"type": "synthetic", "seed": 3, "furnish": True}
     alone = fleet2d.run("bundled:paper", SHORT, seed=4, floorplan=home).digest
     digests = []
@@ -139,7 +136,7 @@ def test_a_folder_shares_a_home_among_processes_and_changes_no_run(
     assert [alone, alone] == digests
 
 
-def test_a_damaged_or_missing_folder_is_no_error(tmp_path: Path) -> None:
+def test_a_damaged_or_missing_folder_is_no_error(tmp_path):
     cache = FolderCache()
     with cache.within(tmp_path):
         cache.get("a", lambda: 1)

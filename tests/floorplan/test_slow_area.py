@@ -35,7 +35,7 @@ def region(x0: float, x1: float, speed: float, stop: str = "0 s") -> Any:
     return SlowArea(area=area, speed=speed, stop=stop).on(Unit())  # type: ignore[arg-type]
 
 
-def test_a_way_through_takes_longer_by_its_length_within_and_the_stop_at_its_edge() -> None:
+def test_a_way_through_takes_longer_by_its_length_within_and_the_stop_at_its_edge():
     rows = slowed(straight(), [region(200, 600, 0.5, "3 s")])
     assert [
         [0, 0, 5, 0, 0],
@@ -46,13 +46,13 @@ def test_a_way_through_takes_longer_by_its_length_within_and_the_stop_at_its_edg
     ] == rows.tolist()
 
 
-def test_where_areas_overlap_the_slowest_counts_and_a_start_within_is_no_entering() -> None:
+def test_where_areas_overlap_the_slowest_counts_and_a_start_within_is_no_entering():
     rows = slowed(straight(), [region(-10, 500, 0.5, "3 s"), region(400, 800, 0.25)])
     assert [0, 800_000, 2_400_000, 2_600_000] == [0, *rows[[1, 3, 4], 0].tolist()]
 
 
 @given(x0=st.integers(-50, 1050), width=st.integers(1, 900), speed=st.sampled_from([0.1, 0.3, 1.0]))
-def test_positions_stay_on_the_leg_and_times_never_fall(x0: int, width: int, speed: float) -> None:
+def test_positions_stay_on_the_leg_and_times_never_fall(x0, width, speed):
     rows = slowed(straight(), [region(x0, x0 + width, speed, "1 s")])
     assert (np.diff(rows[:, 0]) >= 0).all()
     assert (np.diff(rows[:, 1]) >= 0).all()
@@ -87,14 +87,14 @@ def speeds(stored: Any) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("drive", ["differential", "trapezoidal", "holonomic"])
-def test_a_wet_floor_of_the_plan_slows_robots_of_every_drive(drive: str) -> None:
+def test_a_wet_floor_of_the_plan_slows_robots_of_every_drive(drive):
     content = patrol(drive=drive)
     content["floorplan"]["slows"] = [{"area": WET, "speed": "40 %"}]
     within, beside = speeds(run(content))
     assert within == pytest.approx(0.4 * beside, rel=0.02)
 
 
-def test_a_wet_floor_by_script_slows_a_robot_that_is_on_its_way_until_it_is_dry() -> None:
+def test_a_wet_floor_by_script_slows_a_robot_that_is_on_its_way_until_it_is_dry():
     wet = {"at": "07:00:03", "slow": WET, "speed": "20 %", "duration": "3 min"}
     stored = run(patrol(script=[wet]))
     rows = table(stored, "trajectories", entity="astro")
@@ -104,14 +104,14 @@ def test_a_wet_floor_by_script_slows_a_robot_that_is_on_its_way_until_it_is_dry(
     assert moved[200:][is_wet[200:]].max() > 0.45
 
 
-def test_people_walk_on_and_runs_without_slow_areas_are_as_ever() -> None:
+def test_people_walk_on_and_runs_without_slow_areas_are_as_ever():
     people = {"ana": {"type": "meander"}}
     dry, wet = scenario(users=people), scenario(users=people)
     wet["floorplan"] = {**wet["floorplan"], "slows": [{"area": WET, "speed": "10 %"}]}
     assert digests(run(dry))["trajectories"] == digests(run(wet))["trajectories"]
 
 
-def test_slow_areas_are_the_same_for_every_span() -> None:
+def test_slow_areas_are_the_same_for_every_span():
     script = [{"at": "07:01", "slow": WET, "speed": "30 %", "stop": "4 s", "duration": "5 min"}]
     assert digests(run(patrol(script=script))) == digests(
         run(patrol(script=script, simulation={"max_span": 13}))
@@ -126,7 +126,7 @@ def test_slow_areas_are_the_same_for_every_span() -> None:
         ({"slow": WET, "speed": 0.0}, "expected 0.01 or more"),
     ],
 )
-def test_areas_that_are_none_are_refused(fields: dict[str, Any], message: str) -> None:
+def test_areas_that_are_none_are_refused(fields, message):
     with pytest.raises(InputError, match=message):
         fleet2d.load_scenario(patrol(script=[{"at": "07:01", **fields}]))
 
@@ -141,9 +141,7 @@ CENTIMETRES = [[200, 200], [400, 200], [400, 390]]
         ({"slows": [{"area": CENTIMETRES, "speed": 0.5}]}, "floorplan.slows.0"),
     ],
 )
-def test_a_slow_area_in_which_the_home_has_no_floor_is_refused(
-    sections: dict[str, Any], place: str
-) -> None:
+def test_a_slow_area_in_which_the_home_has_no_floor_is_refused(sections, place):
     content = patrol(script=sections.get("script", ()))
     content["floorplan"] = {**content["floorplan"], "slows": sections.get("slows", ())}
 

@@ -1,7 +1,5 @@
 """Furniture in a scenario: placed piece by piece, and by rule."""
 
-from typing import Any
-
 import pytest
 from pydantic import ValidationError
 
@@ -14,7 +12,7 @@ from fleet2d.scenario.load import load_scenario
 RUG = {"type": "rug", "at": [12.0, 2.0], "size": [1.2, 1.2]}
 
 
-def test_pieces_are_added_to_the_plan_with_ways_to_use_them() -> None:
+def test_pieces_are_added_to_the_plan_with_ways_to_use_them():
     chair = {"type": "chair", "at": [13.0, 3.0], "heading_deg": 180, "name": "throne"}
     plan = Bundled(furniture=[RUG, chair]).plan()
     known = load_floorplan().objects
@@ -27,13 +25,13 @@ def test_pieces_are_added_to_the_plan_with_ways_to_use_them() -> None:
     assert seat.approach is not None
 
 
-def test_piece_blocks_what_the_scenario_says() -> None:
+def test_piece_blocks_what_the_scenario_says():
     plan = Bundled(furniture=[{**RUG, "blocks": "sight", "name": "screen"}]).plan()
 
     assert "sight" == plan.object("screen").blocks
 
 
-def test_no_pieces_and_no_rules_leave_the_plan_as_it_is() -> None:
+def test_no_pieces_and_no_rules_leave_the_plan_as_it_is():
     assert load_floorplan() == Bundled().plan()
 
 
@@ -44,28 +42,28 @@ def test_no_pieces_and_no_rules_leave_the_plan_as_it_is() -> None:
         ({"at": [10.5, 2]}, "overlaps a wall of family_home: its box is 1.20 m x 1.20 m"),
     ],
 )
-def test_piece_that_stands_in_no_free_space_is_refused(piece: dict[str, Any], message: str) -> None:
+def test_piece_that_stands_in_no_free_space_is_refused(piece, message):
     with pytest.raises(FloorPlanError, match=message):
         Bundled(furniture=[{**RUG, **piece}]).plan()
 
 
-def test_two_pieces_of_one_name_are_refused() -> None:
+def test_two_pieces_of_one_name_are_refused():
     with pytest.raises(FloorPlanError, match="two objects are named 'mat'"):
         Bundled(furniture=[{**RUG, "name": "mat"}] * 2).plan()
 
 
-def test_unknown_type_is_refused_with_the_nearest_name() -> None:
+def test_unknown_type_is_refused_with_the_nearest_name():
     with pytest.raises(ScenarioError, match=r"furniture.0.type.*did you mean 'bed'"):
         load_scenario("bundled:paper", "floorplan.furniture=[{type: bedd, at: [1, 1]}]")
 
 
 @pytest.mark.parametrize("piece", [{"size": [0, 1]}, {"size": [1]}, {"blocks": "light"}, {"x": 1}])
-def test_wrong_settings_of_a_piece_are_refused(piece: dict[str, Any]) -> None:
+def test_wrong_settings_of_a_piece_are_refused(piece):
     with pytest.raises(ValidationError):
         Bundled(furniture=[{**RUG, **piece}])
 
 
-def test_furnish_takes_true_or_settings() -> None:
+def test_furnish_takes_true_or_settings():
     scenario = load_scenario("bundled:paper", "floorplan.furnish={seed: 3, density: 0.5}")
 
     assert Furnishing(seed=3, density=0.5) == scenario.floorplan.furnish

@@ -11,7 +11,7 @@ LEFT, RIGHT, DOOR = (1.0, 1.0, 4.0, 4.0), (4.1, 1.0, 7.6, 4.0), (4.0, 2.0, 4.1, 
 
 
 @pytest.fixture
-def plan() -> FloorPlan:
+def plan():
     """Two rooms: `room_1` on the right, and the smaller `room_2` on the left."""
     free = shapely.union_all([shapely.box(*box) for box in (LEFT, RIGHT, DOOR)])
     assert isinstance(free, shapely.Polygon)
@@ -22,7 +22,7 @@ def names(plan: FloorPlan) -> list[tuple[str, str]]:
     return [(room.name, room.type) for room in plan.rooms]
 
 
-def test_place_names_and_retypes_its_room_and_its_doorway(plan: FloorPlan) -> None:
+def test_place_names_and_retypes_its_room_and_its_doorway(plan):
     result = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="den", type="Home Office")])
 
     assert [("room_1", "room"), ("den", "office")] == names(result)
@@ -31,7 +31,7 @@ def test_place_names_and_retypes_its_room_and_its_doorway(plan: FloorPlan) -> No
     assert [("room_1", "room"), ("room_2", "room")] == names(plan)
 
 
-def test_room_that_is_only_retyped_is_named_after_its_type(plan: FloorPlan) -> None:
+def test_room_that_is_only_retyped_is_named_after_its_type(plan):
     result = correct_rooms(
         plan, [RoomCorrection(at=(2, 2), type="Küche"), RoomCorrection(at=(5, 2), type="kitchen")]
     )
@@ -39,13 +39,13 @@ def test_room_that_is_only_retyped_is_named_after_its_type(plan: FloorPlan) -> N
     assert [("kitchen_1", "kitchen"), ("kitchen_2", "kitchen")] == names(result)
 
 
-def test_room_that_is_only_named_keeps_its_type(plan: FloorPlan) -> None:
+def test_room_that_is_only_named_keeps_its_type(plan):
     result = correct_rooms(plan, [RoomCorrection(at=(2, 2), name="Anna's")])
 
     assert [("room_1", "room"), ("Anna's", "room")] == names(result)
 
 
-def test_polygon_takes_its_cells_from_other_rooms(plan: FloorPlan) -> None:
+def test_polygon_takes_its_cells_from_other_rooms(plan):
     corners = ((5.6, 0.0), (9.0, 0.0), (9.0, 9.0), (5.6, 9.0))
 
     result = correct_rooms(plan, [RoomCorrection(polygon=corners, type="bedroom")])
@@ -58,7 +58,7 @@ def test_polygon_takes_its_cells_from_other_rooms(plan: FloorPlan) -> None:
     ]
 
 
-def test_polygon_over_a_whole_room_replaces_it(plan: FloorPlan) -> None:
+def test_polygon_over_a_whole_room_replaces_it(plan):
     corners = ((0.0, 0.0), (4.05, 0.0), (4.05, 9.0), (0.0, 9.0))
 
     result = correct_rooms(plan, [RoomCorrection(polygon=corners, name="studio")])
@@ -66,7 +66,7 @@ def test_polygon_over_a_whole_room_replaces_it(plan: FloorPlan) -> None:
     assert [("room_1", "room"), ("studio", "room")] == names(result)
 
 
-def test_nothing_to_correct_is_the_same_plan(plan: FloorPlan) -> None:
+def test_nothing_to_correct_is_the_same_plan(plan):
     assert plan is correct_rooms(plan, [])
 
 
@@ -84,9 +84,7 @@ def test_nothing_to_correct_is_the_same_plan(plan: FloorPlan) -> None:
         (RoomCorrection(at=(2, 2), name="room_1"), "two rooms are named 'room_1'"),
     ],
 )
-def test_correction_that_fits_nowhere_is_an_error(
-    plan: FloorPlan, correction: RoomCorrection, message: str
-) -> None:
+def test_correction_that_fits_nowhere_is_an_error(plan, correction, message):
     with pytest.raises(FloorPlanError, match=message):
         correct_rooms(plan, [correction])
 
@@ -102,12 +100,12 @@ def test_correction_that_fits_nowhere_is_an_error(
         ({"at": [1, 1], "nmae": "den"}, "did you mean 'name'"),
     ],
 )
-def test_incomplete_correction_is_refused(content: object, message: str) -> None:
+def test_incomplete_correction_is_refused(content, message):
     with pytest.raises(ValidationError, match=message):
         RoomCorrection.model_validate(content)
 
 
-def test_scenario_corrects_the_rooms_of_any_source() -> None:
+def test_scenario_corrects_the_rooms_of_any_source():
     x, y = Bundled().load().room("kitchen_1").anchor_xy
 
     source = Bundled.model_validate({"rooms": [{"at": [x, y], "name": "galley"}]})

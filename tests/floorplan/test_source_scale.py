@@ -1,7 +1,5 @@
 """`scale` multiplies the lengths of every source, and sizes that are no home's propose it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -25,7 +23,7 @@ def of_type(plan: FloorPlan, kind: str) -> list[PlacedObject]:
 
 
 @pytest.mark.parametrize("kind", sorted({name.split()[0] for name in FORMATS}))
-def test_scale_multiplies_lengths_of_every_format(kind: str, tmp_path: Path) -> None:
+def test_scale_multiplies_lengths_of_every_format(kind, tmp_path):
     name, content, _ = FORMATS[kind]
     path = write(tmp_path, name, content)
     (tmp_path / "map.pgm").write_bytes(PGM)
@@ -43,7 +41,7 @@ def test_scale_multiplies_lengths_of_every_format(kind: str, tmp_path: Path) -> 
     assert np.allclose(np.array(usual.bounds) * 2, doubled.bounds, atol=0.3)
 
 
-def test_scale_multiplies_everything_in_a_home() -> None:
+def test_scale_multiplies_everything_in_a_home():
     usual, doubled = load_floorplan(cell=0.05), load_floorplan(cell=0.1, scale=2)
     bed, large_bed = of_type(usual, "bed")[0], of_type(doubled, "bed")[0]
 
@@ -58,7 +56,7 @@ def test_scale_multiplies_everything_in_a_home() -> None:
     assert doubled.entrance == tuple(2 * value for value in usual.entrance or ())
 
 
-def test_pixels_of_a_scaled_map_are_its_cells(tmp_path: Path) -> None:
+def test_pixels_of_a_scaled_map_are_its_cells(tmp_path):
     path = write(tmp_path, "map.yaml", {**FORMATS["ros"][1], "resolution": 5})
     (tmp_path / "map.pgm").write_bytes(PGM)
     source = lookup("floorplan", "ros").model_validate({"path": path, "scale": 0.01})
@@ -70,7 +68,7 @@ def test_pixels_of_a_scaled_map_are_its_cells(tmp_path: Path) -> None:
         load_floorplan(path)
 
 
-def test_drawing_has_the_product_of_resolution_and_scale(tmp_path: Path) -> None:
+def test_drawing_has_the_product_of_resolution_and_scale(tmp_path):
     pixels = np.full((60, 80), 255, np.uint8)
     pixels[5:55, 5:75] = 0
     pixels[10:50, 10:70] = 255
@@ -83,7 +81,7 @@ def test_drawing_has_the_product_of_resolution_and_scale(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("scale", [10.0, 39.37, 100.0, 1000.0, 0.1])
-def test_home_in_another_unit_is_told_with_the_line_to_type(scale: float) -> None:
+def test_home_in_another_unit_is_told_with_the_line_to_type(scale):
     try:
         plan = Synthetic(seed=3, cell=min(0.05 * max(scale, 1), 1), scale=scale).plan()
         text = next(f.text for f in checkup(plan) if f.kind == "scale")
@@ -93,7 +91,7 @@ def test_home_in_another_unit_is_told_with_the_line_to_type(scale: float) -> Non
     assert f"floorplan.scale={1 / scale:.3g}" in text
 
 
-def test_unit_is_told_by_the_width_of_doors() -> None:
+def test_unit_is_told_by_the_width_of_doors():
     in_feet = Synthetic(seed=3, scale=3.28084).plan()
     (finding,) = [f for f in checkup(in_feet) if f.kind == "scale"]
 
@@ -102,5 +100,5 @@ def test_unit_is_told_by_the_width_of_doors() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_home_in_metres_has_no_finding_on_its_scale(seed: int) -> None:
+def test_home_in_metres_has_no_finding_on_its_scale(seed):
     assert [] == [f for f in checkup(Synthetic(seed=seed).plan()) if f.kind == "scale"]

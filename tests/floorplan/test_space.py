@@ -118,9 +118,7 @@ def check_routes(space: Space, rng: np.random.Generator, count: int) -> int:
 
 
 @pytest.mark.parametrize("name", HOMES)
-def test_routes_in_real_homes_are_shortest_and_keep_the_radius_from_walls(
-    shared_data: Path, name: str
-) -> None:
+def test_routes_in_real_homes_are_shortest_and_keep_the_radius_from_walls(shared_data, name):
     space = space_of(shared_data / "houseexpo" / f"{name}.json", 0.2)
 
     assert check_routes(space, np.random.default_rng(1), 20) > 5
@@ -128,9 +126,7 @@ def test_routes_in_real_homes_are_shortest_and_keep_the_radius_from_walls(
 
 @quick
 @given(homes(), seeds(), st.sampled_from([0.001, 0.02, 0.06]))
-def test_routes_in_random_homes_are_shortest(
-    polygons: list[Polygon], seed: int, radius: float
-) -> None:
+def test_routes_in_random_homes_are_shortest(polygons, seed, radius):
     space = space_in(polygons, radius)
     if space is not None and space.parts and not _is_pinched(space):
         check_routes(space, np.random.default_rng(seed), 4)
@@ -154,9 +150,7 @@ def _is_pinched(space: Space) -> bool:
 
 @pytest.mark.parametrize("name", HOMES)
 @pytest.mark.parametrize("radius", RADII)
-def test_space_keeps_the_radius_from_walls_and_at_most_the_stated_excess(
-    shared_data: Path, name: str, radius: float
-) -> None:
+def test_space_keeps_the_radius_from_walls_and_at_most_the_stated_excess(shared_data, name, radius):
     """Every cell's centre nearer than the radius is out; every one farther than stated is in."""
     space = space_of(shared_data / "houseexpo" / f"{name}.json", radius)
     plan, reach = space.plan, radius * UNITS_PER_M
@@ -171,7 +165,7 @@ def test_space_keeps_the_radius_from_walls_and_at_most_the_stated_excess(
 
 
 @pytest.mark.parametrize("degrees", [0.0, 22.5, 33.0, 45.0])
-def test_clearance_from_a_wall_at_any_angle_is_as_stated(degrees: float) -> None:
+def test_clearance_from_a_wall_at_any_angle_is_as_stated(degrees):
     """At most 8.3 % more than the radius, next to rounding; nothing more at 0 and 45 degrees."""
     room = shapely.affinity.rotate(shapely.box(1, 1, 5, 4), degrees)
     space = Space(build_plan(room), 0.3)
@@ -197,9 +191,7 @@ def two_rooms(width: float, offset: float, thickness: float = 0.1) -> shapely.Ge
 @pytest.mark.parametrize("radius", [0.1, 0.15, 0.2, 0.25, 0.3])
 @pytest.mark.parametrize("offset", [1.0, 1.0137, 0.77])
 @pytest.mark.parametrize("upright", [True, False])
-def test_a_body_passes_a_doorway_two_centimetres_wider_and_none_narrower(
-    radius: float, offset: float, upright: bool
-) -> None:
+def test_a_body_passes_a_doorway_two_centimetres_wider_and_none_narrower(radius, offset, upright):
     for spare, passes in ((0.02, True), (-0.02, False)):
         free = two_rooms(2 * radius + spare, offset)
         if upright:
@@ -214,7 +206,7 @@ def test_a_body_passes_a_doorway_two_centimetres_wider_and_none_narrower(
         assert space.parts == (1 if passes else 2)
 
 
-def test_a_doorway_needs_less_than_a_centimetre_to_spare() -> None:
+def test_a_doorway_needs_less_than_a_centimetre_to_spare():
     """The lattice takes at most 2 * 5 units, which is 8 mm."""
     for radius in np.arange(0.1, 0.4, 0.0137).tolist():
         assert Space(build_plan(two_rooms(2 * radius + 0.0095, 1.0)), radius).parts == 1
@@ -250,7 +242,7 @@ def check_symmetry(plan: FloorPlan, radius: float, slip: float) -> None:
 
 
 @pytest.mark.parametrize("radius", [0.2, 0.217])
-def test_space_of_a_turned_and_mirrored_home_is_the_same(radius: float) -> None:
+def test_space_of_a_turned_and_mirrored_home_is_the_same(radius):
     """Known failure 15: erosion with even kernels left other clearance on each side."""
     pillars = [
         shapely.box(1, 1, 1.3, 2),
@@ -264,13 +256,13 @@ def test_space_of_a_turned_and_mirrored_home_is_the_same(radius: float) -> None:
 
 @pytest.mark.parametrize("name", HOMES)
 def test_space_of_a_turned_and_mirrored_real_home_is_the_same_to_the_grid_of_walls(
-    shared_data: Path, name: str
-) -> None:
+    shared_data, name
+):
     """Where two slanted sides meet in the middle between two wall points, rounding picks one."""
     check_symmetry(plan_of(shared_data / "houseexpo" / f"{name}.json"), 0.2, 2.0)
 
 
-def test_route_from_the_border_of_the_space_first_leads_inside() -> None:
+def test_route_from_the_border_of_the_space_first_leads_inside():
     space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
     walls = walls_of(space.plan.polygons)
     goal = tuple(space.plan.lattice.to_lattice((3.0, 2.4)).tolist())
@@ -288,7 +280,7 @@ def test_route_from_the_border_of_the_space_first_leads_inside() -> None:
         assert straight_ways(region(space), path[1:-1], path[2:]).all()
 
 
-def test_route_from_beside_a_wall_does_not_step_through_it() -> None:
+def test_route_from_beside_a_wall_does_not_step_through_it():
     """The nearest free cell lies behind the wall; the way back in leads to the near side."""
     rooms = shapely.box(0, 0, 4, 3).difference(shapely.box(2, 0, 2.02, 2.2))
     space = Space(build_plan(rooms), 0.2)
@@ -302,7 +294,7 @@ def test_route_from_beside_a_wall_does_not_step_through_it() -> None:
     assert len(path) > 4
 
 
-def test_route_from_a_wall_or_outside_is_none() -> None:
+def test_route_from_a_wall_or_outside_is_none():
     space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
     lattice = space.plan.lattice
     goal = tuple(lattice.to_lattice((3.0, 2.4)).tolist())
@@ -311,7 +303,7 @@ def test_route_from_a_wall_or_outside_is_none() -> None:
         assert space.route(tuple(lattice.to_lattice(at).tolist()), goal) is None
 
 
-def test_route_to_a_place_without_room_is_none() -> None:
+def test_route_to_a_place_without_room_is_none():
     space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
     lattice = space.plan.lattice
     start = tuple(lattice.to_lattice((3.0, 2.4)).tolist())
@@ -320,7 +312,7 @@ def test_route_to_a_place_without_room_is_none() -> None:
     assert space.route(start, tuple(lattice.to_lattice((2.05, 0.5)).tolist())) is None
 
 
-def test_route_to_the_border_of_the_space_is_none() -> None:
+def test_route_to_the_border_of_the_space_is_none():
     """It used to lead round by a corner of the space, as a sight line never ends on a wall."""
     free = shapely.box(0, 0, 5, 4).difference(shapely.box(2, 1, 3, 3))
     space = Space(build_plan(free), 0.2)
@@ -334,7 +326,7 @@ def test_route_to_the_border_of_the_space_is_none() -> None:
         assert space.route(tuple(start), tuple((goal + 1).tolist())) is not None
 
 
-def test_spaces_of_all_homes_number_their_parts_by_size(shared_data: Path) -> None:
+def test_spaces_of_all_homes_number_their_parts_by_size(shared_data):
     paths = plan_files(shared_data)
     for path in paths:
         for radius in RADII:
@@ -347,12 +339,12 @@ def test_spaces_of_all_homes_number_their_parts_by_size(shared_data: Path) -> No
 
 
 @pytest.mark.parametrize("radius", [1.01, 5.0])
-def test_space_of_a_body_too_wide_for_the_home_says_so(radius: float) -> None:
+def test_space_of_a_body_too_wide_for_the_home_says_so(radius):
     with pytest.raises(FloorPlanError, match=r"fits nowhere in test home: give it a smaller"):
         Space(build_plan(shapely.box(0, 0, 2, 2)), radius)
 
 
-def test_parts_are_numbered_from_the_largest() -> None:
+def test_parts_are_numbered_from_the_largest():
     space = Space(
         build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
     )
@@ -365,7 +357,7 @@ def test_parts_are_numbered_from_the_largest() -> None:
     assert len(space.cells(None, 0)) > len(space.cells(None, 1)) > 0
 
 
-def test_nearest_is_the_nearest_cell_of_the_part() -> None:
+def test_nearest_is_the_nearest_cell_of_the_part():
     space = Space(
         build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
     )
@@ -386,9 +378,7 @@ def test_nearest_is_the_nearest_cell_of_the_part() -> None:
     "at", [(-3.0, -2.0), (0.0, 0.9), (5.0, 1.0), (4.0, 0.3), (6.9, 1.99), (9.0, 4.0)]
 )
 @pytest.mark.parametrize("most", [1, 350, 600, 1000, 100_000])
-def test_free_cells_by_distance_are_those_of_the_whole_home_in_order(
-    at: tuple[float, float], most: int
-) -> None:
+def test_free_cells_by_distance_are_those_of_the_whole_home_in_order(at, most):
     space = Space(
         build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
     )
@@ -401,7 +391,7 @@ def test_free_cells_by_distance_are_those_of_the_whole_home_in_order(
     assert cells[np.argsort(away, kind="stable")[:most]].tolist() == found.tolist()
 
 
-def test_polygons_grow_together_as_each_does_alone() -> None:
+def test_polygons_grow_together_as_each_does_alone():
     hook = Polygon([(0, 0), (600, 0), (600, 600), (500, 600), (500, 100), (0, 100)])
     polygons = [shapely.box(0, 0, 90, 40), hook, Polygon([(0, 0), (80, 10), (20, 70)])]
     together = grow_polygons(polygons, 100)
@@ -414,13 +404,13 @@ def test_polygons_grow_together_as_each_does_alone() -> None:
     assert [] == grow_polygons([], 100)
 
 
-def test_copy_of_a_space_is_itself() -> None:
+def test_copy_of_a_space_is_itself():
     space = Space(build_plan(shapely.box(0, 0, 2, 2)), 0.2)
 
     assert copy.deepcopy(space) is space
 
 
-def test_distance_field_is_a_little_longer_than_the_shortest_way() -> None:
+def test_distance_field_is_a_little_longer_than_the_shortest_way():
     plan = load_floorplan()
     space = Space(plan, 0.2)
     goal = space.nearest(*plan.lattice.to_lattice(plan.rooms[0].anchor_xy).tolist())
@@ -436,7 +426,7 @@ def test_distance_field_is_a_little_longer_than_the_shortest_way() -> None:
     assert np.isinf(field[0, 0])
 
 
-def test_distances_of_points_are_the_same_measured_from_the_places_and_from_the_points() -> None:
+def test_distances_of_points_are_the_same_measured_from_the_places_and_from_the_points():
     plan = load_floorplan()
     space, rng = Space(plan, 0.2), np.random.default_rng(0)
     cells = np.argwhere(space.part_of_cell >= 0)
@@ -463,14 +453,14 @@ def moved_and_grown(
 
 @quick
 @given(rectilinear_homes(), st.integers(4, 300))
-def test_walls_are_moved_as_far_as_they_grow(polygons: list[Polygon], radius: int) -> None:
+def test_walls_are_moved_as_far_as_they_grow(polygons, radius):
     for moved, rest in moved_and_grown(polygons, radius):
         assert moved is None or moved.equals(rest)
 
 
 @pytest.mark.parametrize("step", [2, 40, 128, 186, 188, 400])
 @pytest.mark.parametrize("low", [False, True])
-def test_steps_in_walls_are_hidden_by_what_stands_beside_them(step: int, low: bool) -> None:
+def test_steps_in_walls_are_hidden_by_what_stands_beside_them(step, low):
     corners = [(0, 0), (4000, 0), (4000, 3000), (2000, 3000 + step), (0, 3000 + step)]
     if low:
         corners = [(x, 3000 + step - y if y >= 3000 else y) for x, y in corners]
@@ -482,7 +472,7 @@ def test_steps_in_walls_are_hidden_by_what_stands_beside_them(step: int, low: bo
     assert moved.equals(rest)
 
 
-def test_walls_are_not_moved_through_each_other() -> None:
+def test_walls_are_not_moved_through_each_other():
     narrow = shapely.union_all([shapely.box(0, 0, 999, 999), shapely.box(998, 400, 1999, 500)])
     slanted = Polygon([(0, 0), (4000, 0), (4000, 3000)])
     for polygon in (narrow, slanted):

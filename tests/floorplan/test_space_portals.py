@@ -37,7 +37,7 @@ def house(folder: Path, **changes: Any) -> Path:
     return path
 
 
-def test_storeys_are_one_part_for_people_and_two_for_robots(tmp_path: Path) -> None:
+def test_storeys_are_one_part_for_people_and_two_for_robots(tmp_path):
     home = Home(load_floorplan(house(tmp_path)))
 
     assert 2 == home.space(0.2).parts
@@ -47,7 +47,7 @@ def test_storeys_are_one_part_for_people_and_two_for_robots(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("period", ["1 s", "1 h"])
-def test_stairs_are_no_way_through_the_plan(tmp_path: Path, period: str) -> None:
+def test_stairs_are_no_way_through_the_plan(tmp_path, period):
     """Who went upstairs covered the metres between two storeys in the plan, at 26 m/s."""
     far = [[[x + 22 * (x >= 8), y] for x, y in ring] for ring in HOUSE["free"]]
     rooms = [HOUSE["rooms"][0], {"type": "bedroom", "polygon": far[1]}]
@@ -71,14 +71,14 @@ def test_stairs_are_no_way_through_the_plan(tmp_path: Path, period: str) -> None
     assert 5 < done.metrics["distance"]["ana"] / 24 < 20
 
 
-def test_furniture_on_the_stairs_bars_them(tmp_path: Path) -> None:
+def test_furniture_on_the_stairs_bars_them(tmp_path):
     box = {"type": "box", "footprint": [[3, 2], [5, 2], [5, 4], [3, 4]]}
     home = Home(load_floorplan(house(tmp_path, objects=[box])))
 
     assert 2 == home.space(0.2, uses_portals=True).parts
 
 
-def test_way_leads_by_the_nearer_stairs(tmp_path: Path) -> None:
+def test_way_leads_by_the_nearer_stairs(tmp_path):
     far = {"start": [0.5, 0.5], "end": [12.5, 0.5], "type": "lift"}
     plan = load_floorplan(house(tmp_path, portals=[STAIRS, far]))
     space, at = Home(plan).space(0.2, uses_portals=True), plan.lattice.point_at
@@ -96,16 +96,14 @@ def test_way_leads_by_the_nearer_stairs(tmp_path: Path) -> None:
     [([6.5, 1], "is in no room of house: the nearest free place is ("),
      ([1, 1], "a way leads from its one end to the other already")],
 )  # fmt: skip
-def test_portal_that_links_no_storeys_is_refused(
-    tmp_path: Path, end: list[float], problem: str
-) -> None:
+def test_portal_that_links_no_storeys_is_refused(tmp_path, end, problem):
     with pytest.raises(FloorPlanError) as caught:
         load_floorplan(house(tmp_path, portals=[STAIRS | {"end": end}]))
 
     assert problem in str(caught.value)
 
 
-def test_plan_with_portals_is_written_and_read_back(tmp_path: Path) -> None:
+def test_plan_with_portals_is_written_and_read_back(tmp_path):
     plan = load_floorplan(house(tmp_path))
 
     save_floorplan(plan, tmp_path / "copy.json")
@@ -130,9 +128,7 @@ def scenario(folder: Path, **changes: Any) -> dict[str, Any]:
     }
 
 
-def test_people_climb_in_the_time_it_takes_and_are_seen_on_their_storey_only(
-    tmp_path: Path,
-) -> None:
+def test_people_climb_in_the_time_it_takes_and_are_seen_on_their_storey_only(tmp_path):
     run = fleet2d.run(scenario(tmp_path))
 
     rows = run.tables["trajectories"].to_pandas()
@@ -151,13 +147,13 @@ def test_people_climb_in_the_time_it_takes_and_are_seen_on_their_storey_only(
 
 
 @pytest.mark.slow
-def test_steps_and_spans_of_a_house_with_stairs_are_the_same(tmp_path: Path) -> None:
+def test_steps_and_spans_of_a_house_with_stairs_are_the_same(tmp_path):
     assert (
         fleet2d.run(scenario(tmp_path)).digest == fleet2d.run(scenario(tmp_path, max_span=1)).digest
     )
 
 
-def test_portals_in_a_scenario_are_checked_where_they_stand(tmp_path: Path) -> None:
+def test_portals_in_a_scenario_are_checked_where_they_stand(tmp_path):
     settings = scenario(tmp_path)
     settings["floorplan"]["portals"] = [{"ends": [[1, 1], [2, 2]]}]
 
@@ -165,7 +161,7 @@ def test_portals_in_a_scenario_are_checked_where_they_stand(tmp_path: Path) -> N
         fleet2d.run(settings)
 
 
-def test_the_checkup_tells_what_a_robot_loses_that_climbs_no_stairs(tmp_path: Path) -> None:
+def test_the_checkup_tells_what_a_robot_loses_that_climbs_no_stairs(tmp_path):
     (found,) = checkup(load_floorplan(house(tmp_path)))
 
     assert ("storeys", "odd") == (found.kind, found.severity)
@@ -178,7 +174,7 @@ def test_the_checkup_tells_what_a_robot_loses_that_climbs_no_stairs(tmp_path: Pa
 @pytest.mark.parametrize(
     ("climbs", "rooms"), [(False, {"kitchen_1"}), (True, {"kitchen_1", "bedroom_1"})]
 )
-def test_a_robot_gets_upstairs_if_it_climbs(tmp_path: Path, climbs: bool, rooms: set[str]) -> None:
+def test_a_robot_gets_upstairs_if_it_climbs(tmp_path, climbs, rooms):
     floorplan = {"type": "native", "path": str(house(tmp_path))}
     rounds = {"type": "patrol", "rooms": ["kitchen", "bedroom"]}
     robots = {"astro": {"start": "kitchen", "climbs": climbs, "behaviors": [rounds]}}
@@ -189,7 +185,7 @@ def test_a_robot_gets_upstairs_if_it_climbs(tmp_path: Path, climbs: bool, rooms:
     assert rooms == {stored.plan.rooms[r].name for r in np.array(way.room)[1:][still]}
 
 
-def test_members_of_a_household_sleep_upstairs(tmp_path: Path) -> None:
+def test_members_of_a_household_sleep_upstairs(tmp_path):
     floorplan = {"type": "native", "path": str(house(tmp_path)), "furnish": True}
     household = {"members": {"ana": "retired", "ben": "works_outside"}}
     users = {name: {"type": "routine", "household": household} for name in household["members"]}

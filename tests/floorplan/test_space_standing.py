@@ -25,7 +25,7 @@ BOX = shapely.box(0, 0, 6, 4)
 
 
 @pytest.fixture(scope="module")
-def plan() -> FloorPlan:
+def plan():
     return FloorPlan.build("box", BOX)
 
 
@@ -34,9 +34,7 @@ corner = st.tuples(st.integers(10, 50), st.integers(10, 30))
 
 @quick
 @given(st.lists(corner, min_size=3, max_size=6), st.sampled_from([0.0, 0.2, 0.25]))
-def test_grown_cells_are_those_nearer_than_the_radius(
-    corners: list[tuple[int, int]], radius: float
-) -> None:
+def test_grown_cells_are_those_nearer_than_the_radius(corners, radius):
     footprint = shapely.Polygon(np.array(corners) / 10)
     if not footprint.is_valid or footprint.area < 0.01:
         return
@@ -62,8 +60,8 @@ def test_grown_cells_are_those_nearer_than_the_radius(
     st.sampled_from([0.0, 0.2, 0.25]),
 )
 def test_cells_around_a_rectangle_are_those_around_the_same_outline_with_another_corner(
-    low: tuple[int, int], size: tuple[int, int], radius: float
-) -> None:
+    low, size, radius
+):
     """A fifth corner on a side keeps it from the quick way for rectangles."""
     lattice = FloorPlan.build("box", BOX).lattice
     x0, y0 = np.array(low) / 20
@@ -78,7 +76,7 @@ def test_cells_around_a_rectangle_are_those_around_the_same_outline_with_another
     assert np.array_equal(quickly, covered)
 
 
-def test_standing_cells_are_in_the_space_among_the_furniture(plan: FloorPlan) -> None:
+def test_standing_cells_are_in_the_space_among_the_furniture(plan):
     things = [
         stand_furniture("table", (3.0, 2.0), 512, name="table"),
         stand_furniture("rug", (1.0, 1.0), name="rug"),
@@ -91,7 +89,7 @@ def test_standing_cells_are_in_the_space_among_the_furniture(plan: FloorPlan) ->
     assert (standing_cells(full, 0.25, things[1:]) == standing_cells(full, 0.25, [])).all()
 
 
-def test_bed_at_a_wall_is_used_from_its_free_side(plan: FloorPlan) -> None:
+def test_bed_at_a_wall_is_used_from_its_free_side(plan):
     bed = stand_furniture("bed", (1.0, 3.2), 0, (1.6, 2.0))
     reachable = with_approaches(plan, bed, standing_cells(plan, 0.25, [bed]))
 
@@ -103,7 +101,7 @@ def test_bed_at_a_wall_is_used_from_its_free_side(plan: FloorPlan) -> None:
     assert (reachable.uses[-1].x, reachable.uses[-1].y) == reachable.uses[-1].approach
 
 
-def test_nobody_gets_on_a_sofa_through_a_wall() -> None:
+def test_nobody_gets_on_a_sofa_through_a_wall():
     two = shapely.union_all([shapely.box(0, 0, 2, 1), shapely.box(0, 1.1, 4, 4)])
     plan = FloorPlan.build("two", two)
     sofa = stand_furniture("sofa", (1.0, 0.5), size=(1.9, 0.9))
@@ -111,13 +109,13 @@ def test_nobody_gets_on_a_sofa_through_a_wall() -> None:
     assert () == with_approaches(plan, sofa, standing_cells(plan, 0.25, [sofa])).uses
 
 
-def test_place_inside_a_wall_has_no_approach(plan: FloorPlan) -> None:
+def test_place_inside_a_wall_has_no_approach(plan):
     use = UsePlace(-0.3, 1.0, 0.0, "sit")
 
     assert nearest_standing(plan, use, standing_cells(plan, 0.2), 1.0) is None
 
 
-def test_object_without_uses_stays_as_it_is(plan: FloorPlan) -> None:
+def test_object_without_uses_stays_as_it_is(plan):
     thing = PlacedObject("plinth", "plinth", shapely.box(1, 1, 2, 2))
 
     assert thing == with_approaches(plan, thing, standing_cells(plan, 0.2))

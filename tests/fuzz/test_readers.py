@@ -19,7 +19,7 @@ FINDS = sorted((Path(__file__).parent / "finds").glob("*-*"))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READERS)
-def test_what_is_nearly_right_is_read_or_refused(name: str) -> None:
+def test_what_is_nearly_right_is_read_or_refused(name):
     reader = READERS[name]
 
     @settings(
@@ -38,6 +38,6 @@ def test_what_is_nearly_right_is_read_or_refused(name: str) -> None:
 
 
 @pytest.mark.parametrize("find", FINDS, ids=lambda path: path.name)
-def test_what_was_found_once_stays_mended(find: Path) -> None:
+def test_what_was_found_once_stays_mended(find):
     reader = READERS[find.name.rpartition("-")[0]]
     assert "" == judge(reader, find.read_bytes())

@@ -92,14 +92,14 @@ def refusal(read: Callable[..., object], path: Path, *arguments: Any) -> str:
     return str(caught.value)
 
 
-def test_every_format_of_documents_has_a_sample() -> None:
+def test_every_format_of_documents_has_a_sample():
     kinds = {k for k, source in components("floorplan").items() if getattr(source, "marks", ())}
 
     assert set() == kinds - set(FORMATS), "give tests/homes/formats/test_NAME.py a SAMPLE"
 
 
 @every_format
-def test_the_file_itself_is_read(tmp_path: Path, kind: str) -> None:
+def test_the_file_itself_is_read(tmp_path, kind):
     name, content, read = FORMATS[kind]
     path = write(tmp_path, name, content)
 
@@ -114,9 +114,7 @@ def test_the_file_itself_is_read(tmp_path: Path, kind: str) -> None:
 
 @every_format
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.7, 0.95])
-def test_truncated_file_is_refused_or_lacks_what_it_says(
-    tmp_path: Path, kind: str, share: float
-) -> None:
+def test_truncated_file_is_refused_or_lacks_what_it_says(tmp_path, kind, share):
     name, content, read = FORMATS[kind]
     path = write(tmp_path, name, content)
     whole = path.read_bytes()
@@ -150,7 +148,7 @@ RUBBISH = {
 
 @every_format
 @pytest.mark.parametrize("rubbish", RUBBISH)
-def test_rubbish_is_refused_in_a_few_words(tmp_path: Path, kind: str, rubbish: str) -> None:
+def test_rubbish_is_refused_in_a_few_words(tmp_path, kind, rubbish):
     name, content, read = FORMATS[kind]
     path = write(tmp_path, name, content)
     path.write_bytes(RUBBISH[rubbish])
@@ -160,7 +158,7 @@ def test_rubbish_is_refused_in_a_few_words(tmp_path: Path, kind: str, rubbish: s
 
 
 @every_format
-def test_missing_file_and_folder_are_refused(tmp_path: Path, kind: str) -> None:
+def test_missing_file_and_folder_are_refused(tmp_path, kind):
     name, _, read = FORMATS[kind]
 
     assert ": check floorplan.path" in refusal(read, tmp_path / name)
@@ -205,7 +203,7 @@ vector_format = pytest.mark.parametrize(
 
 @vector_format
 @pytest.mark.parametrize("outline", OUTLINES)
-def test_invalid_outline_is_refused(tmp_path: Path, kind: str, outline: str) -> None:
+def test_invalid_outline_is_refused(tmp_path, kind, outline):
     name, _, read = FORMATS[kind]
     path = write(tmp_path, name, with_outline(kind, OUTLINES[outline]))
 
@@ -213,9 +211,7 @@ def test_invalid_outline_is_refused(tmp_path: Path, kind: str, outline: str) -> 
 
 
 @vector_format
-def test_outline_that_crosses_itself_is_refused_or_repaired_with_a_note(
-    tmp_path: Path, kind: str
-) -> None:
+def test_outline_that_crosses_itself_is_refused_or_repaired_with_a_note(tmp_path, kind):
     name, _, read = FORMATS[kind]
     path = write(tmp_path, name, with_outline(kind, [[0, 0], [4, 4], [4, 0], [0, 4]]))
 
@@ -232,7 +228,7 @@ def test_outline_that_crosses_itself_is_refused_or_repaired_with_a_note(
     # YAML takes its time to be parsed, and HouseExpo's doorways to be found.
     [("native", 20_000), ("geojson", 12_000), ("native as YAML", 3000), ("houseexpo", 3000)],
 )
-def test_outline_of_very_many_corners_is_read(tmp_path: Path, kind: str, corners: int) -> None:
+def test_outline_of_very_many_corners_is_read(tmp_path, kind, corners):
     angles = np.linspace(0, 2 * np.pi, corners, endpoint=False)
     circle = np.round(np.stack([8 * np.cos(angles), 8 * np.sin(angles)], axis=1), 7).tolist()
     name, _, read = FORMATS[kind]
@@ -242,7 +238,7 @@ def test_outline_of_very_many_corners_is_read(tmp_path: Path, kind: str, corners
 
 
 @vector_format
-def test_tiny_coordinate_is_zero(tmp_path: Path, kind: str) -> None:
+def test_tiny_coordinate_is_zero(tmp_path, kind):
     """GEOS would divide by a tiny coordinate."""
     name, _, read = FORMATS[kind]
     path = write(tmp_path, name, with_outline(kind, [[0, 0], [1e-300, 0], [4, 3], [-1e-200, 3]]))
@@ -252,7 +248,7 @@ def test_tiny_coordinate_is_zero(tmp_path: Path, kind: str) -> None:
 
 @pytest.mark.slow
 @vector_format
-def test_outline_of_9_000_m2_is_read(tmp_path: Path, kind: str) -> None:
+def test_outline_of_9_000_m2_is_read(tmp_path, kind):
     name, _, read = FORMATS[kind]
     path = write(tmp_path, name, with_outline(kind, [[0, 0], [100, 0], [100, 90], [0, 90]]))
 
@@ -281,7 +277,7 @@ IMAGES = {
 
 
 @pytest.mark.parametrize("image", IMAGES)
-def test_damaged_image_is_refused(tmp_path: Path, image: str) -> None:
+def test_damaged_image_is_refused(tmp_path, image):
     if image.startswith("png"):
         pytest.importorskip("PIL.Image")
     path = write(tmp_path, "map.yaml", ROS)
@@ -291,7 +287,7 @@ def test_damaged_image_is_refused(tmp_path: Path, image: str) -> None:
     assert "map.pgm" in refusal(read_image, tmp_path / "map.pgm", 0.05)
 
 
-def test_missing_image_is_refused(tmp_path: Path) -> None:
+def test_missing_image_is_refused(tmp_path):
     path = write(tmp_path, "map.yaml", ROS)
     (tmp_path / "map.pgm").unlink()
 
@@ -300,7 +296,7 @@ def test_missing_image_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("resolution", [0.0, -1.0, 2.0, math.nan, math.inf])
-def test_invalid_resolution_is_refused(tmp_path: Path, resolution: float) -> None:
+def test_invalid_resolution_is_refused(tmp_path, resolution):
     write(tmp_path, "map.yaml", ROS)
 
     assert "resolution is" in refusal(read_image, tmp_path / "map.pgm", resolution)
@@ -312,9 +308,7 @@ def test_invalid_resolution_is_refused(tmp_path: Path, resolution: float) -> Non
     deadline=None,
 )
 @given(st.binary(max_size=80), st.integers(0, len(PGM)), st.booleans())
-def test_image_with_other_bytes_somewhere_is_read_or_refused(
-    tmp_path: Path, other: bytes, place: int, insert: bool
-) -> None:
+def test_image_with_other_bytes_somewhere_is_read_or_refused(tmp_path, other, place, insert):
     write(tmp_path, "map.yaml", ROS)
     rest = PGM[place if insert else place + len(other) :]
     (tmp_path / "map.pgm").write_bytes(PGM[:place] + other + rest)
@@ -403,9 +397,7 @@ def read_or_refused(read: Read, path: Path) -> None:
     deadline=None,
 )
 @given(st.data())
-def test_wrong_things_anywhere_are_read_or_refused(
-    tmp_path: Path, kind: str, data: st.DataObject
-) -> None:
+def test_wrong_things_anywhere_are_read_or_refused(tmp_path, kind, data):
     name, content, read = FORMATS[kind]
     damaged = copy.deepcopy(content)
     where = st.tuples(st.sampled_from(list(places(content))), st.sampled_from((*WRONG, places)))

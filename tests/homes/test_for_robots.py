@@ -6,14 +6,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 import shapely
-from tests.scenes import Cli
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.homes.for_robots import save_map, save_world
 
 
-def test_a_map_for_ros_reads_back_as_the_same_free_space_without_furniture(tmp_path: Path) -> None:
+def test_a_map_for_ros_reads_back_as_the_same_free_space_without_furniture(tmp_path):
     plan = load_floorplan("family_home")
 
     save_map(plan, tmp_path / "home.pgm")
@@ -26,9 +25,7 @@ def test_a_map_for_ros_reads_back_as_the_same_free_space_without_furniture(tmp_p
     assert plan.lattice.cell == again.lattice.cell
 
 
-def test_a_world_for_gazebo_has_solid_walls_exactly_where_the_home_has_no_free_space(
-    tmp_path: Path,
-) -> None:
+def test_a_world_for_gazebo_has_solid_walls_exactly_where_the_home_has_no_free_space(tmp_path):
     plan = load_floorplan("family_home")
 
     save_world(plan, tmp_path / "home.sdf")
@@ -50,16 +47,14 @@ def corners(polyline: ET.Element) -> list[tuple[float, ...]]:
 
 
 @pytest.mark.parametrize("target", ["map.pgm", "home.sdf"])
-def test_convert_for_robots_says_what_a_map_or_a_world_leaves_out(
-    fleet2d: Cli, target: str
-) -> None:
+def test_convert_for_robots_says_what_a_map_or_a_world_leaves_out(fleet2d, target):
     code, out, _ = fleet2d("convert", "family_home", target)
 
     assert code == 0
     assert "left out, as it holds only what stands in the way: 14 rooms, 14 doorways" in out
 
 
-def test_convert_writes_both_and_replaces_nothing(fleet2d: Cli) -> None:
+def test_convert_writes_both_and_replaces_nothing(fleet2d):
     assert 0 == fleet2d("convert", "synthetic:7", "map.pgm")[0]
     assert 0 == fleet2d("convert", "synthetic:7", "home.sdf")[0]
     before = Path("map.pgm").read_bytes()
@@ -71,7 +66,7 @@ def test_convert_writes_both_and_replaces_nothing(fleet2d: Cli) -> None:
     assert before == Path("map.pgm").read_bytes()
 
 
-def test_a_map_whose_settings_exist_is_not_written(tmp_path: Path) -> None:
+def test_a_map_whose_settings_exist_is_not_written(tmp_path):
     (tmp_path / "map.yaml").write_text("mine: 1\n")
 
     with pytest.raises(FloorPlanError, match=r"map\.yaml exists already"):
@@ -81,7 +76,7 @@ def test_a_map_whose_settings_exist_is_not_written(tmp_path: Path) -> None:
     assert "mine: 1\n" == (tmp_path / "map.yaml").read_text()
 
 
-def test_places_have_the_same_coordinates_in_a_map(tmp_path: Path) -> None:
+def test_places_have_the_same_coordinates_in_a_map(tmp_path):
     plan = load_floorplan("family_home")
 
     save_map(plan, tmp_path / "home.pgm")

@@ -100,7 +100,7 @@ ARRAYS: dict[str, dict[str, bytes | None]] = {
 
 @pytest.mark.parametrize("read", [Weights.read, load_learned])
 @pytest.mark.parametrize("name", ARRAYS)
-def test_a_forged_array_is_refused(tmp_path: Path, name: str, read: Reader) -> None:
+def test_a_forged_array_is_refused(tmp_path, name, read):
     path = packed(tmp_path / f"{name}.npz", members(**ARRAYS[name]))
     with pytest.raises(InputError, match=str(path)) as caught:
         read(path)
@@ -110,15 +110,15 @@ def test_a_forged_array_is_refused(tmp_path: Path, name: str, read: Reader) -> N
 @pytest.mark.parametrize("read", [Weights.read, load_learned])
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_an_archive_that_unpacks_to_more_than_the_bound_is_refused(
-    tmp_path: Path, method: int, read: Reader, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, method, read, monkeypatch
+):
     monkeypatch.setenv("FLEET2D_MAX_LEARNED_BYTES", str(1 << 20))
     path = packed(tmp_path / "bomb.npz", members(z=ZEROS), method)
     with pytest.raises(InputError, match=r"at most|compressed in another way"):
         read(path)
 
 
-def test_a_directory_that_states_less_than_a_member_unpacks_to_is_refused(tmp_path: Path) -> None:
+def test_a_directory_that_states_less_than_a_member_unpacks_to_is_refused(tmp_path):
     path = packed(tmp_path / "forged-size.npz", {"z.npy": ZEROS}, zipfile.ZIP_DEFLATED)
     content = bytearray(path.read_bytes())
     at = content.rfind(b"PK\1\2")
@@ -128,13 +128,13 @@ def test_a_directory_that_states_less_than_a_member_unpacks_to_is_refused(tmp_pa
         load_learned(path)
 
 
-def test_an_archive_with_a_hundred_thousand_arrays_is_refused(tmp_path: Path) -> None:
+def test_an_archive_with_a_hundred_thousand_arrays_is_refused(tmp_path):
     path = packed(tmp_path / "many.npz", {f"{n}.npy": b"" for n in range(30_000)})
     with pytest.raises(InputError, match="too many arrays"):
         load_learned(path)
 
 
-def test_an_array_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+def test_an_array_that_is_there_twice_is_refused(tmp_path):
     path = packed(tmp_path / "dup.npz", members())
     with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(path, "a") as archive:
         archive.writestr("bias.npy", npy("(32,)", data=np.full(32, np.nan, "<f4").tobytes()))
@@ -142,7 +142,7 @@ def test_an_array_that_is_there_twice_is_refused(tmp_path: Path) -> None:
         Weights.read(path)
 
 
-def test_an_array_that_is_no_weight_is_refused(tmp_path: Path) -> None:
+def test_an_array_that_is_no_weight_is_refused(tmp_path):
     path = packed(tmp_path / "more.npz", members(z=npy("(1,)", data=bytes(4))))
     with pytest.raises(InputError, match="has 'z', which is no part of a model"):
         Weights.read(path)
@@ -150,7 +150,7 @@ def test_an_array_that_is_no_weight_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("read", [Weights.read, load_learned])
 @pytest.mark.parametrize("kind", ["fifo", "dev", "dir", "empty", "text", "trunc", "encrypted"])
-def test_what_is_no_archive_is_refused(tmp_path: Path, kind: str, read: Reader) -> None:
+def test_what_is_no_archive_is_refused(tmp_path, kind, read):
     path = tmp_path / f"{kind}.npz"
     match kind:
         case "fifo":
@@ -172,7 +172,7 @@ def test_what_is_no_archive_is_refused(tmp_path: Path, kind: str, read: Reader) 
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the memory isn't known")
-def test_bomb_bz2_is_refused_before_it_fills_the_memory() -> None:
+def test_bomb_bz2_is_refused_before_it_fills_the_memory():
     """19 kB took 4.6 GB."""
     code = (
         "from fleet2d.algorithms.presence.learned import Weights\n"
@@ -245,12 +245,12 @@ def bag(path: Path, rows: list[tuple[str, str, int, bytes]], storage: str = "SQL
 
 
 @pytest.fixture(params=["SQLITE3", "MCAP"])
-def storage(request: pytest.FixtureRequest) -> str:
+def storage(request):
     return str(request.param)
 
 
 @pytest.fixture
-def good(tmp_path: Path) -> Path:
+def good(tmp_path):
     return bag(tmp_path / "bag", poses(messages()))
 
 
@@ -291,7 +291,7 @@ def read_map(path: Path) -> Any:
     return BagMap(path=path).load()
 
 
-def test_a_good_bag_is_read_packed_and_not(tmp_path: Path, good: Path, storage: str) -> None:
+def test_a_good_bag_is_read_packed_and_not(tmp_path, good, storage):
     assert 99 == len(read_bag(bag(tmp_path / storage, poses(messages()), storage)).time_us)
     connection = sqlite3.connect(database(good))
     for number, data in connection.execute("SELECT id, data FROM messages").fetchall():
@@ -303,7 +303,7 @@ def test_a_good_bag_is_read_packed_and_not(tmp_path: Path, good: Path, storage: 
     assert 99 == len(read_bag(good).time_us)
 
 
-def test_a_good_bag_whose_file_is_packed_is_read(good: Path) -> None:
+def test_a_good_bag_whose_file_is_packed_is_read(good):
     file = database(good)
     packed_file = good / f"{file.name}.zstd"
     packed_file.write_bytes(pa.compress(file.read_bytes(), "zstd", asbytes=True))
@@ -315,14 +315,14 @@ def test_a_good_bag_whose_file_is_packed_is_read(good: Path) -> None:
 
 
 @pytest.mark.parametrize("read", [read_bag, read_detections, load_floorplan])
-def test_bomb_mcap_is_refused(read: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bomb_mcap_is_refused(read, monkeypatch):
     monkeypatch.setenv("FLEET2D_MAX_READ_MB", "200")
     assert "FLEET2D_MAX_READ_MB" in refusal(BOMBS / "bomb-mcap.mcap", read)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the memory isn't known")
-def test_bomb_mcap_is_refused_before_it_fills_the_memory() -> None:
+def test_bomb_mcap_is_refused_before_it_fills_the_memory():
     """48 kB took 3.1 GB."""
     code = (
         "from fleet2d.logs.bags import read_bag\n"
@@ -333,9 +333,7 @@ def test_bomb_mcap_is_refused_before_it_fills_the_memory() -> None:
     assert peak < 900
 
 
-def test_bomb_of_zstd_in_the_messages_of_a_database_is_refused(
-    good: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bomb_of_zstd_in_the_messages_of_a_database_is_refused(good, monkeypatch):
     limit_memory(monkeypatch)
     zeros = pa.compress(bytes(65 << 20), "zstd", asbytes=True)
     connection = sqlite3.connect(database(good))
@@ -347,9 +345,7 @@ def test_bomb_of_zstd_in_the_messages_of_a_database_is_refused(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="only Unix limits the size of files")
-def test_file_that_unpacks_to_more_than_a_log_has_is_refused(
-    good: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_that_unpacks_to_more_than_a_log_has_is_refused(good, monkeypatch):
     monkeypatch.setenv("FLEET2D_MAX_LOG_BYTES", str(64 << 20))
     file = database(good)
     file.unlink()
@@ -361,7 +357,7 @@ def test_file_that_unpacks_to_more_than_a_log_has_is_refused(
     assert "File too large" in refusal(good)
 
 
-def test_a_large_blob_is_refused(good: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_blob_is_refused(good, monkeypatch):
     limit_memory(monkeypatch)
     tamper(good, "UPDATE messages SET data=zeroblob(65000000) WHERE id=1")
     assert "memory" in refusal(good)
@@ -381,9 +377,7 @@ REBUILT = {
 
 
 @pytest.mark.parametrize("name", REBUILT)
-def test_a_database_that_computes_its_rows_is_refused(
-    good: Path, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_database_that_computes_its_rows_is_refused(good, name, monkeypatch):
     """A view of endless rows was read for ever."""
     limit_memory(monkeypatch)
     monkeypatch.setenv("FLEET2D_MAX_BAG_SECONDS", "1")
@@ -402,13 +396,13 @@ TAMPERED = {
 
 
 @pytest.mark.parametrize("name", TAMPERED)
-def test_a_tampered_database_is_refused(good: Path, name: str) -> None:
+def test_a_tampered_database_is_refused(good, name):
     tamper(good, *TAMPERED[name])
     assert str(good) in refusal(good)
 
 
 @pytest.mark.parametrize("name", ["trunc", "flip", "text", "zero"])
-def test_a_damaged_bag_is_refused(tmp_path: Path, storage: str, name: str) -> None:
+def test_a_damaged_bag_is_refused(tmp_path, storage, name):
     folder = bag(tmp_path / "bag", poses(messages()), storage)
     path = next(p for p in folder.iterdir() if p.suffix in (".db3", ".mcap"))
     whole = path.read_bytes()
@@ -431,7 +425,7 @@ METADATA: dict[str, Callable[[str], str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", METADATA)
-def test_forged_metadata_is_refused(good: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_forged_metadata_is_refused(good, name, monkeypatch):
     monkeypatch.setenv("FLEET2D_MAX_BAG_SECONDS", "2")
     path = good / "metadata.yaml"
     path.write_text(METADATA[name](path.read_text()))
@@ -440,9 +434,7 @@ def test_forged_metadata_is_refused(good: Path, name: str, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("name", ["metadata.yaml", "bag.db3"])
 @pytest.mark.parametrize("trick", ["link", "dev", "fifo"])
-def test_a_link_or_a_pipe_in_a_bag_is_refused(
-    tmp_path: Path, good: Path, name: str, trick: str
-) -> None:
+def test_a_link_or_a_pipe_in_a_bag_is_refused(tmp_path, good, name, trick):
     path = good / name
     shutil.move(path, tmp_path / name)
     if trick == "fifo":
@@ -452,26 +444,24 @@ def test_a_link_or_a_pipe_in_a_bag_is_refused(
     assert f"{path} is " in refusal(good)
 
 
-def test_mapfar_is_refused() -> None:
+def test_mapfar_is_refused():
     """An origin of (1e300, NaN) ended in a traceback."""
     assert "its corner is at (1e+300, nan) m" in refusal(BOMBS / "mcap-mapfar", read_map)
 
 
 @pytest.mark.parametrize("x", [np.inf, -1e300, np.nan])
-def test_a_map_far_away_is_refused(tmp_path: Path, storage: str, x: float) -> None:
+def test_a_map_far_away_is_refused(tmp_path, storage, x):
     folder = bag(tmp_path / "bag", [grid(messages(), 80, x)], storage)
     assert "the map of /map is damaged" in refusal(folder, read_map)
 
 
 @pytest.mark.slow
-def test_a_map_of_many_cells_is_refused(tmp_path: Path, storage: str) -> None:
+def test_a_map_of_many_cells_is_refused(tmp_path, storage):
     folder = bag(tmp_path / "bag", [grid(messages(), 8000)], storage)
     assert "has 64000000 pixels, and at most 16777216" in refusal(folder, read_map)
 
 
-def test_a_bomb_of_bz2_in_a_bag_of_ros_1_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bomb_of_bz2_in_a_bag_of_ros_1_is_refused(tmp_path, monkeypatch):
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 

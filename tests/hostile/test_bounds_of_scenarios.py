@@ -74,7 +74,7 @@ QUICK = ["extends", "users", "wrong users"]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(bombs(1)) if THOROUGH else QUICK)
-def test_scenario_is_refused_within_seconds(tmp_path: Path, name: str) -> None:
+def test_scenario_is_refused_within_seconds(tmp_path, name):
     """`extends` of 20,000 names, 30,000 users or 200,000 anchors took 7 to 25 s and more."""
     text, message = bombs(25_000)[name]
     (tmp_path / "home.yaml").write_text(text)
@@ -95,7 +95,7 @@ def test_scenario_is_refused_within_seconds(tmp_path: Path, name: str) -> None:
     assert megabytes < MEGABYTES
 
 
-def test_a_household_is_read_once_for_all_its_members(tmp_path: Path) -> None:
+def test_a_household_is_read_once_for_all_its_members(tmp_path):
     """It was read and validated for each of them, which took a minute for some hundreds."""
     from fleet2d.scenario.load import load_scenario
 
@@ -115,7 +115,7 @@ def test_a_household_is_read_once_for_all_its_members(tmp_path: Path) -> None:
     assert 1 == len({id(persona) for persona in households[0].members.values()})
 
 
-def test_a_household_has_a_bound(tmp_path: Path) -> None:
+def test_a_household_has_a_bound(tmp_path):
     """Each member is stored with all others in the manifest: 2,500 were too many to read again."""
     from fleet2d.errors import ScenarioError
     from fleet2d.scenario.load import load_scenario
@@ -137,7 +137,7 @@ def persona_files(folder: Path, n: int) -> None:
 
 
 @pytest.mark.parametrize("persona", ["own0.yaml", f"{{extends: [{'retired, ' * 5000}retired]}}"])
-def test_a_persona_extends_a_bounded_number_of_files(tmp_path: Path, persona: str) -> None:
+def test_a_persona_extends_a_bounded_number_of_files(tmp_path, persona):
     """Files that extend the next one twice were read for hours, 2,000 names for 9 s."""
     from fleet2d.errors import ScenarioError
     from fleet2d.scenario.load import load_scenario
@@ -161,7 +161,7 @@ def house(folder: Path, members: int) -> Path:
     return folder / "home.yaml"
 
 
-def test_personas_of_a_household_count_for_each_member(tmp_path: Path) -> None:
+def test_personas_of_a_household_count_for_each_member(tmp_path):
     """A household of 100 had a manifest of 284 MB, which nothing could read; 24 of them, 20 GB."""
     from fleet2d.errors import ScenarioError
     from fleet2d.scenario.load import load_scenario
@@ -172,7 +172,7 @@ def test_personas_of_a_household_count_for_each_member(tmp_path: Path) -> None:
     assert 2 >= len(str(caught.value).splitlines())
 
 
-def test_long_texts_of_personas_count_for_each_user(tmp_path: Path) -> None:
+def test_long_texts_of_personas_count_for_each_user(tmp_path):
     """A text is stored for each user: 60 MB for 2,499 of them were 150 GB of a manifest."""
     from fleet2d.errors import ScenarioError
     from fleet2d.scenario.load import load_scenario
@@ -185,9 +185,7 @@ def test_long_texts_of_personas_count_for_each_user(tmp_path: Path) -> None:
         load_scenario(tmp_path / "home.yaml")
 
 
-def test_no_run_begins_that_could_not_be_opened(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_run_begins_that_could_not_be_opened(tmp_path, monkeypatch):
     """It was simulated and stored whole, and then its manifest was too large to be read."""
     import fleet2d
     from fleet2d.artifacts import store
@@ -201,7 +199,7 @@ def test_no_run_begins_that_could_not_be_opened(
     assert not (tmp_path / "month").exists()
 
 
-def test_places_of_replaced_values_are_forgotten(tmp_path: Path) -> None:
+def test_places_of_replaced_values_are_forgotten(tmp_path):
     """Messages name where a value is written now, not where one that it replaced was."""
     from fleet2d.scenario.compose import compose
 

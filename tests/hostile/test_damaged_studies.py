@@ -16,7 +16,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
-from tests.scenes import Cli
 from tests.studies.scenes import SPEED, run, small
 from tests.thorough import THOROUGH, some
 
@@ -135,7 +134,7 @@ CASES: list[tuple[str, str, Damage]] = [
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     """A study that ran to its end."""
     folder = tmp_path_factory.mktemp("studies") / "study"
     run(STUDY, folder)
@@ -143,7 +142,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def study(whole: Path, tmp_path: Path) -> Path:
+def study(whole, tmp_path):
     """The same, to be damaged."""
     return shutil.copytree(whole, tmp_path / "study")
 
@@ -155,9 +154,7 @@ COMMANDS = (("status",), ("rerun", "1"), ("report",))
 @pytest.mark.parametrize(
     "number", some(range(len(CASES)), 7), ids=lambda n: f"{CASES[n][0]} {CASES[n][1]}"
 )
-def test_commands_say_in_one_line_what_is_damaged(
-    study: Path, tmp_path: Path, fleet2d: Cli, number: int
-) -> None:
+def test_commands_say_in_one_line_what_is_damaged(study, tmp_path, fleet2d, number):
     file, _, damage = CASES[number]
     damage(next(study.glob(file)))
     # A report takes a second: of alike cases only some are reported.
@@ -177,7 +174,7 @@ OF_ITS_PLAN = [n for n, case in enumerate(CASES) if case[0] == PLAN and case[1] 
 
 
 @pytest.mark.parametrize("number", sorted({*some(range(1, len(CASES)), 11), *OF_ITS_PLAN[3:5]}))
-def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number: int) -> None:
+def test_the_study_runs_again_or_says_why_not(study, fleet2d, number):
     file, _, damage = CASES[number]
     damage(next(study.glob(file)))
     Path("study.yaml").write_text(yaml.safe_dump(STUDY, sort_keys=False))
@@ -198,9 +195,7 @@ def test_the_study_runs_again_or_says_why_not(study: Path, fleet2d: Cli, number:
         (PLAN, "number -5", "status"),
     ],
 )
-def test_a_contradiction_within_a_file_is_named(
-    study: Path, fleet2d: Cli, file: str, change: str, command: str
-) -> None:
+def test_a_contradiction_within_a_file_is_named(study, fleet2d, file, change, command):
     """They ended in `KeyError: 'seed'` and `cannot convert float NaN to integer`."""
     next(damage for name, case, damage in CASES if (name, case) == (file, change))(study / file)
 
@@ -216,7 +211,7 @@ def test_a_contradiction_within_a_file_is_named(
 @pytest.mark.parametrize(
     "name", ["../precious", "/precious", "study.json", "results/../../precious"]
 )
-def test_forged_names_of_files_delete_nothing(study: Path, fleet2d: Cli, name: str) -> None:
+def test_forged_names_of_files_delete_nothing(study, fleet2d, name):
     """A record that named `../x` or an absolute path had that file deleted by `study run`."""
     precious = study.parent / "precious"
     precious.write_text("keep")
@@ -230,7 +225,7 @@ def test_forged_names_of_files_delete_nothing(study: Path, fleet2d: Cli, name: s
 
 
 @pytest.mark.parametrize("link", ["results", "study.json.partial", "tables", "lock"])
-def test_nothing_is_written_through_a_link(study: Path, fleet2d: Cli, link: str) -> None:
+def test_nothing_is_written_through_a_link(study, fleet2d, link):
     """`study.json.partial` as a link had its target overwritten."""
     outside = study.parent / "outside"
     outside.mkdir()
@@ -246,7 +241,7 @@ def test_nothing_is_written_through_a_link(study: Path, fleet2d: Cli, link: str)
     assert code == 0 or "is a link" in err
 
 
-def test_names_with_escapes_are_printed_without(study: Path, fleet2d: Cli) -> None:
+def test_names_with_escapes_are_printed_without(study, fleet2d):
     _set_value(study / "study.json", "name", "speeds\x1b[2J")
     code, out, _ = fleet2d("study", "status", str(study))
     assert (0, "speeds\\x1b[2J: 4 of 4 variants complete, 0 failed, 0 to run\n") == (code, out)
@@ -258,9 +253,7 @@ def test_names_with_escapes_are_printed_without(study: Path, fleet2d: Cli) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("file", ["search.json", "trials.log"])
 @pytest.mark.parametrize("damage", ["empty", "cut", "noise", "folder", "link"])
-def test_a_damaged_search_is_refused_in_one_line(
-    tmp_path: Path, fleet2d: Cli, file: str, damage: str
-) -> None:
+def test_a_damaged_search_is_refused_in_one_line(tmp_path, fleet2d, file, damage):
     """Damaged trials ended in errors of Optuna and of json."""
     pytest.importorskip("optuna")
     settings = {

@@ -24,18 +24,18 @@ MANIFEST = "dataset.json"
 
 
 @pytest.fixture(scope="module")
-def whole() -> Path:
+def whole():
     root: Path = made().root
     return root
 
 
 @pytest.fixture
-def copy(tmp_path: Path, whole: Path) -> Path:
+def copy(tmp_path, whole):
     return Path(shutil.copytree(whole, tmp_path / "set"))
 
 
 @pytest.fixture
-def elsewhere(tmp_path: Path, whole: Path) -> Path:
+def elsewhere(tmp_path, whole):
     """A folder of the user, with what a link in a data set may lead to."""
     folder = Path(shutil.copytree(whole, tmp_path / "elsewhere"))
     (folder / "secret.txt").write_text("precious, and nobody's business")
@@ -87,9 +87,7 @@ def folder(path: Path, _: Path) -> None:
 @pytest.mark.parametrize("use", USES)
 @pytest.mark.parametrize("trick", [link, link_to_secret, endless, pipe])
 @pytest.mark.parametrize("name", [MANIFEST, "train", "train/labels-00000.parquet"])
-def test_a_link_or_a_pipe_is_refused(
-    copy: Path, elsewhere: Path, name: str, trick: Callable[[Path, Path], None], use: str
-) -> None:
+def test_a_link_or_a_pipe_is_refused(copy, elsewhere, name, trick, use):
     target = copy / name
     shutil.rmtree(target) if target.is_dir() else target.unlink()
     trick(target, elsewhere)
@@ -100,9 +98,7 @@ def test_a_link_or_a_pipe_is_refused(
 
 @pytest.mark.parametrize("name", ["train", "pictures", "unfinished", "README.md"])
 @pytest.mark.parametrize("is_complete", [False, True])
-def test_files_that_are_lacking_are_not_made_through_a_link(
-    copy: Path, elsewhere: Path, name: str, is_complete: bool
-) -> None:
+def test_files_that_are_lacking_are_not_made_through_a_link(copy, elsewhere, name, is_complete):
     """They were written into the folder that the link leads to, with exit code 0."""
     (copy / "test" / "rooms-00000.parquet").unlink()
     if not is_complete:
@@ -163,7 +159,7 @@ FORGED: dict[str, Callable[[dict[str, Any]], Any]] = {
 
 
 @pytest.mark.parametrize("name", FORGED)
-def test_a_forged_manifest_is_refused(copy: Path, elsewhere: Path, name: str) -> None:
+def test_a_forged_manifest_is_refused(copy, elsewhere, name):
     path = copy / MANIFEST
     manifest = json.loads(path.read_text())
     FORGED[name](manifest)
@@ -179,21 +175,19 @@ def test_a_forged_manifest_is_refused(copy: Path, elsewhere: Path, name: str) ->
 @pytest.mark.parametrize(
     "text", ["[" * 100_000, '{"format": 1, "format": 1}', "\xff", "", '{"format": NaN}', "[1]"]
 )
-def test_a_manifest_that_is_no_strict_json_is_refused(
-    copy: Path, elsewhere: Path, text: str
-) -> None:
+def test_a_manifest_that_is_no_strict_json_is_refused(copy, elsewhere, text):
     (copy / MANIFEST).write_bytes(text.encode("latin1"))
     for use in USES.values():
         assert str(copy / MANIFEST) in attack(copy, elsewhere, use)
 
 
-def test_a_manifest_of_many_files_is_bounded(copy: Path, elsewhere: Path) -> None:
+def test_a_manifest_of_many_files_is_bounded(copy, elsewhere):
     """3 million names took gigabytes."""
     (copy / MANIFEST).write_text(f'{{"files": "{"x" * (65 << 20)}"}}')
     assert "at most 67108864 are read" in attack(copy, elsewhere, verify)
 
 
-def test_a_manifest_that_is_a_folder_is_refused(copy: Path, elsewhere: Path) -> None:
+def test_a_manifest_that_is_a_folder_is_refused(copy, elsewhere):
     (copy / MANIFEST).unlink()
     (copy / MANIFEST).mkdir()
     assert "can't be read" in attack(copy, elsewhere, verify)
@@ -242,9 +236,7 @@ def forge(root: Path, table: str, change: Callable[[pa.Table], pa.Table]) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("table", "column", "way"), some(COLUMNS, 3))
-def test_a_forged_column_is_refused_or_harmless(
-    copy: Path, elsewhere: Path, table: str, column: str, way: str
-) -> None:
+def test_a_forged_column_is_refused_or_harmless(copy, elsewhere, table, column, way):
     def change(content: pa.Table) -> pa.Table:
         index = content.column_names.index(column)
         new = alike(SCHEMAS[table].field(column).type)[way](content[column])
@@ -260,9 +252,7 @@ def test_a_forged_column_is_refused_or_harmless(
 
 @pytest.mark.parametrize("table", SCHEMAS)
 @pytest.mark.parametrize("damage", ["gone", "cut", "zero", "names", "missing", "empty"])
-def test_a_damaged_table_is_refused_or_harmless(
-    copy: Path, elsewhere: Path, table: str, damage: str
-) -> None:
+def test_a_damaged_table_is_refused_or_harmless(copy, elsewhere, table, damage):
     changes: dict[str, Callable[[pa.Table], pa.Table]] = {
         "names": lambda t: t.rename_columns([f"x{name}" for name in t.column_names]),
         "missing": lambda t: t.drop_columns([t.column_names[0]]),
@@ -281,7 +271,7 @@ def test_a_damaged_table_is_refused_or_harmless(
 
 
 @pytest.mark.slow
-def test_rows_that_take_little_room_in_a_file_are_bounded(copy: Path, elsewhere: Path) -> None:
+def test_rows_that_take_little_room_in_a_file_are_bounded(copy, elsewhere):
     """60 million equal rows in a file of 2 MB filled the memory."""
     path = copy / "train" / "labels-00000.parquet"
     row = pq.ParquetFile(path).read().slice(0, 1).combine_chunks()
@@ -294,9 +284,7 @@ def test_rows_that_take_little_room_in_a_file_are_bounded(copy: Path, elsewhere:
 
 
 @pytest.mark.slow
-def test_a_forged_record_or_part_of_an_unfinished_one_is_made_again_or_refused(
-    copy: Path, elsewhere: Path
-) -> None:
+def test_a_forged_record_or_part_of_an_unfinished_one_is_made_again_or_refused(copy, elsewhere):
     data = open_dataset(copy)
     (copy / MANIFEST).unlink()
     parts = copy / "unfinished"
@@ -312,9 +300,7 @@ def test_a_forged_record_or_part_of_an_unfinished_one_is_made_again_or_refused(
     assert [] == open_dataset(copy).verify()
 
 
-def test_names_of_models_are_printed_without_control_characters(
-    copy: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_names_of_models_are_printed_without_control_characters(copy, capsys):
     from fleet2d.learning.datasets.command import _print_scores
 
     def change(content: pa.Table) -> pa.Table:

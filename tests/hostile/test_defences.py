@@ -27,7 +27,7 @@ def source_of(defence: Defence) -> str:
 
 
 @pytest.mark.parametrize("defence", DEFENCES, ids=lambda defence: defence.name)
-def test_a_defence_is_there_once_and_so_is_its_test(defence: Defence) -> None:
+def test_a_defence_is_there_once_and_so_is_its_test(defence):
     file, _, test = defence.test.partition("::")
 
     assert 1 == source_of(defence).count(defence.line)
@@ -36,7 +36,7 @@ def test_a_defence_is_there_once_and_so_is_its_test(defence: Defence) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("defence", some(DEFENCES, 6), ids=lambda defence: defence.name)
-def test_a_test_fails_without_the_defence(tmp_path: Path, defence: Defence) -> None:
+def test_a_test_fails_without_the_defence(tmp_path, defence):
     module = f"fleet2d.{defence.module}"
     without = source_of(defence).replace(defence.line, defence.instead)
     compile(without, module, "exec")

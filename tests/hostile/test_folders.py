@@ -135,12 +135,12 @@ def unfinished(root: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def root(tmp_path_factory):
     return tmp_path_factory.mktemp("folders")
 
 
 @pytest.fixture
-def elsewhere(tmp_path: Path, root: Path) -> Path:
+def elsewhere(tmp_path, root):
     """A folder of the user, with things that a hostile folder leads to."""
     folder = tmp_path / "elsewhere"
     shutil.copytree(unfinished(root), folder / "run")
@@ -205,13 +205,8 @@ def attack(run: Path, elsewhere: Path, use: Callable[[Path], Any]) -> str:
 @pytest.mark.parametrize("make", [complete, unfinished])
 @pytest.mark.parametrize("command", READERS)
 def test_a_run_that_leads_elsewhere_harms_nothing(
-    tmp_path: Path,
-    root: Path,
-    elsewhere: Path,
-    record_property: Callable[[str, int], None],
-    command: str,
-    make: Callable[[Path], Path],
-) -> None:
+    tmp_path, root, elsewhere, record_property, command, make
+):
     source, use = make(root), READERS[command]
     attacks = some(ATTACKS, 58 if command in ("reproduce", "resume") else 27)
     for name, trick in attacks:
@@ -231,12 +226,8 @@ def test_a_run_that_leads_elsewhere_harms_nothing(
 @pytest.mark.slow
 @pytest.mark.parametrize("command", PAINTERS)
 def test_a_figure_of_a_run_that_leads_elsewhere_harms_nothing(
-    tmp_path: Path,
-    root: Path,
-    elsewhere: Path,
-    record_property: Callable[[str, int], None],
-    command: str,
-) -> None:
+    tmp_path, root, elsewhere, record_property, command
+):
     pytest.importorskip("matplotlib")
     names = ("key_frames.parquet", "floorplan.json", *FILES[FILES.index("picture.png") :])
     attacks = some([(name, trick) for name in names for trick in TRICKS], 47)
@@ -251,9 +242,7 @@ def test_a_figure_of_a_run_that_leads_elsewhere_harms_nothing(
 
 @pytest.mark.parametrize("trick", [link_to_file, link_to_like, link_to_nowhere, pipe])
 @pytest.mark.parametrize("name", ["manifest.json", "floorplan.json", "key_frames.parquet"])
-def test_a_reader_says_what_is_in_place_of_a_file(
-    tmp_path: Path, root: Path, elsewhere: Path, name: str, trick: Callable[[Path, Path], None]
-) -> None:
+def test_a_reader_says_what_is_in_place_of_a_file(tmp_path, root, elsewhere, name, trick):
     """A pipe as a table was waited for; links were followed."""
     run = shutil.copytree(complete(root), tmp_path / "run")
     (run / name).unlink()
@@ -263,7 +252,7 @@ def test_a_reader_says_what_is_in_place_of_a_file(
     assert message.startswith(f"{run / name} {words}")
 
 
-def test_a_link_to_a_run_is_a_run(tmp_path: Path, root: Path) -> None:
+def test_a_link_to_a_run_is_a_run(tmp_path, root):
     (tmp_path / "latest").symlink_to(complete(root))
     read_all(tmp_path / "latest")
     assert verify_run(tmp_path / "latest").same
@@ -271,9 +260,7 @@ def test_a_link_to_a_run_is_a_run(tmp_path: Path, root: Path) -> None:
 
 @pytest.mark.parametrize("name", ["../../x", "/tmp/x", "..", "a/b", "x\n", "\x1b[2J", "a\\b", ""])
 @pytest.mark.parametrize("key", some(["tables", "files", "algorithms", "users"], 2))
-def test_names_in_a_manifest_lead_nowhere(
-    tmp_path: Path, root: Path, elsewhere: Path, key: str, name: str
-) -> None:
+def test_names_in_a_manifest_lead_nowhere(tmp_path, root, elsewhere, key, name):
     run = shutil.copytree(complete(root), tmp_path / "run")
     path = run / "manifest.json"
     content = json.loads(path.read_text())
@@ -292,9 +279,7 @@ def test_names_in_a_manifest_lead_nowhere(
     assert names == set(state_of(tmp_path))
 
 
-def test_leftovers_of_another_run_are_not_removed_through_a_link(
-    tmp_path: Path, root: Path, elsewhere: Path
-) -> None:
+def test_leftovers_of_another_run_are_not_removed_through_a_link(tmp_path, root, elsewhere):
     """`resume` of a complete run removes its `unfinished`: a link there led to another run's."""
     run = shutil.copytree(complete(root), tmp_path / "run")
     (run / "unfinished").symlink_to(elsewhere / "run" / "unfinished")

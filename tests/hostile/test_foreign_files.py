@@ -1,7 +1,6 @@
 """Files of other programs at which their libraries crash, end in tracebacks, or never end."""
 
 import gzip
-from pathlib import Path
 
 import pytest
 
@@ -91,7 +90,7 @@ PACKAGES = {".ifc": "ifcopenshell", ".svg": "svgelements", ".dxf": "ezdxf"}
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_what_a_library_fails_at_is_an_error_of_one_line(tmp_path: Path, name: str) -> None:
+def test_what_a_library_fails_at_is_an_error_of_one_line(tmp_path, name):
     content, message = CASES[name]
     path = tmp_path / name
     pytest.importorskip(PACKAGES[path.suffix])
@@ -106,7 +105,7 @@ def test_what_a_library_fails_at_is_an_error_of_one_line(tmp_path: Path, name: s
     assert "export it again" in str(caught.value)
 
 
-def test_packed_many_times_is_refused(tmp_path: Path) -> None:
+def test_packed_many_times_is_refused(tmp_path):
     """The reader looked into each of 2,398 layers within the other."""
     content = b"hello"
     for _ in range(2000):

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from tests.engine.test_repeat_resume import cut_off
-from tests.scenes import Cli, everything
+from tests.scenes import everything
 from tests.thorough import some
 
 import fleet2d
@@ -29,14 +29,14 @@ Change = Callable[[pa.Table], pa.Table]
 
 
 @pytest.fixture(scope="module")
-def genuine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def genuine(tmp_path_factory):
     directory = tmp_path_factory.mktemp("runs") / "genuine"
     fleet2d.run(everything("20 min"), out=directory)
     return directory
 
 
 @pytest.fixture
-def run(genuine: Path, tmp_path: Path) -> Path:
+def run(genuine, tmp_path):
     return Path(shutil.copytree(genuine, tmp_path / "run"))
 
 
@@ -91,7 +91,7 @@ def differing(run: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("name", FORGERIES)
-def test_a_rewritten_table_under_a_new_seal_is_noticed(run: Path, name: str) -> None:
+def test_a_rewritten_table_under_a_new_seal_is_noticed(run, name):
     table, change = FORGERIES[name]
     rewrite(run, table, change)
     seal_anew(run)
@@ -99,7 +99,7 @@ def test_a_rewritten_table_under_a_new_seal_is_noticed(run: Path, name: str) -> 
 
 
 @pytest.mark.parametrize("name", some(list(FORGERIES), 3))
-def test_a_rewritten_table_under_a_new_seal_is_not_reproduced(run: Path, name: str) -> None:
+def test_a_rewritten_table_under_a_new_seal_is_not_reproduced(run, name):
     table, change = FORGERIES[name]
     rewrite(run, table, change)
     seal_anew(run)
@@ -108,7 +108,7 @@ def test_a_rewritten_table_under_a_new_seal_is_not_reproduced(run: Path, name: s
     assert [table] == result.differing
 
 
-def test_only_an_exact_repetition_notices_a_forgery_without_contradictions(run: Path) -> None:
+def test_only_an_exact_repetition_notices_a_forgery_without_contradictions(run):
     """Digests of the forged rows, a digest of these digests, a seal: who has them, has another run."""
 
     def vouch(manifest: Manifest) -> None:
@@ -151,14 +151,12 @@ def other_unit(manifest: Manifest) -> None:
         (lambda m: m.tables.pop("events"), "manifest.json: digest"),
     ],
 )
-def test_a_manifest_that_contradicts_the_tables_is_noticed(
-    run: Path, change: Callable[[Manifest], None], name: str
-) -> None:
+def test_a_manifest_that_contradicts_the_tables_is_noticed(run, change, name):
     seal_anew(run, change)
     assert name in differing(run)
 
 
-def test_a_manifest_without_its_seal_is_not_verified(run: Path, fleet2d: Cli) -> None:
+def test_a_manifest_without_its_seal_is_not_verified(run, fleet2d):
     path = run / "manifest.json"
     content = json.loads(path.read_text())
     path.write_text(json.dumps({**content, "seal": None}))
@@ -172,7 +170,7 @@ def test_a_manifest_without_its_seal_is_not_verified(run: Path, fleet2d: Cli) ->
         verify_run(run)
 
 
-def test_all_that_is_not_part_of_the_run_is_listed(run: Path, tmp_path: Path) -> None:
+def test_all_that_is_not_part_of_the_run_is_listed(run, tmp_path):
     """A lock, pictures that are none and whatever lay in `unfinished` went unmentioned."""
     (run / "unfinished").mkdir()
     (run / "unfinished" / "journal").write_text("of another run")
@@ -189,7 +187,7 @@ def test_all_that_is_not_part_of_the_run_is_listed(run: Path, tmp_path: Path) ->
     ] == foreign  # fmt: skip
 
 
-def test_an_interrupted_run_may_have_what_is_needed_to_resume_it(tmp_path: Path) -> None:
+def test_an_interrupted_run_may_have_what_is_needed_to_resume_it(tmp_path):
     simulation = fleet2d.Simulation(everything("20 min"), out=tmp_path / "run")
     simulation.run_until(600)
     simulation.finish()
@@ -199,14 +197,14 @@ def test_an_interrupted_run_may_have_what_is_needed_to_resume_it(tmp_path: Path)
     assert ["unfinished/more"] == verify_run(tmp_path / "run").foreign
 
 
-def test_names_of_foreign_files_reach_no_terminal_unescaped(run: Path) -> None:
+def test_names_of_foreign_files_reach_no_terminal_unescaped(run):
     (run / "\x1b[2Jgone").write_text("?")
     (run / "\x1b[2J.parquet").write_text("?")
     assert [r"\x1b[2J.parquet", r"\x1b[2Jgone"] == verify_run(run).foreign
     assert r"no part of the run: \x1b[2J.parquet" in open_run(run).notes
 
 
-def test_a_run_whose_status_was_raised_is_not_vouched_for(tmp_path: Path) -> None:
+def test_a_run_whose_status_was_raised_is_not_vouched_for(tmp_path):
     """A run that was cut off has no digest to compare with, whatever its status says."""
     simulation = fleet2d.Simulation(everything("20 min"), out=tmp_path / "run")
     simulation.run_until(600)

@@ -89,7 +89,7 @@ def two_rooms(width: float, degrees: float, kind: str) -> FloorPlan:
 
 @pytest.mark.parametrize("degrees", some([0, 10, 22.5, 33, 45], 2))
 @pytest.mark.parametrize("width", some([0.36, 0.42, 0.48, 0.52, 0.54], 3))
-def test_a_narrow_gap_stays_passable(width: float, degrees: float) -> None:
+def test_a_narrow_gap_stays_passable(width, degrees):
     """A bed or a nightstand stood before a gap that the largest body doesn't fit through.
 
     That cut off 4 to 8 m² from users and robots, who do; and at 0.52 m and 0.54 m from the largest
@@ -113,7 +113,7 @@ def turned_home(plan: FloorPlan, degrees: float, cell: float) -> FloorPlan:
 @pytest.mark.parametrize(
     ("degrees", "cell"), some([(61, 0.2), (7, 0.05), (30, 0.1), (45, 0.05)], 4)
 )
-def test_turned_homes_stay_connected(degrees: float, cell: float, shared_data: Path) -> None:
+def test_turned_homes_stay_connected(degrees, cell, shared_data):
     """At cells of 0.2 m furniture cut 0.7 m² and 0.8 m² off a turned home."""
     furnished = 0
     for path in plan_files(shared_data):
@@ -134,13 +134,13 @@ def slanted_room(number: int, kind: str) -> FloorPlan:
     return FloorPlan.build("slanted", room, [LabelledRegion((kind,), room.buffer(0.1))])
 
 
-def test_two_nooks_that_are_one_are_not_cut_off() -> None:
+def test_two_nooks_that_are_one_are_not_cut_off():
     """Rounded against bodies they were two of less than 0.25 m²: exactly, one of 0.3 m²."""
     check(slanted_room(14, "bedroom"))
 
 
 @pytest.mark.parametrize("number", some(range(40), 8))
-def test_slanted_rooms_stay_connected(number: int) -> None:
+def test_slanted_rooms_stay_connected(number):
     for kind in some(sorted(RULES), 4):
         plan = slanted_room(number, kind)
         for seed in some(range(4), 4):
@@ -163,7 +163,7 @@ def captured(folder: Path) -> Iterator[FloorPlan]:
 
 
 @pytest.mark.slow
-def test_captured_homes_stay_connected(shared_data: Path) -> None:
+def test_captured_homes_stay_connected(shared_data):
     pieces = [check(plan) for plan in captured(shared_data / "captured")]
 
     assert sum(pieces) > (100 if THOROUGH else 5)

@@ -7,7 +7,6 @@ import sys
 import threading
 import time
 import urllib.request
-from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -177,7 +176,7 @@ def request(run: fleet2d.Simulation, order: Any) -> None:
 @pytest.mark.parametrize("doors", [False, True])
 @settings(max_examples=examples(50))
 @given(orders=st.lists(ORDERS, max_size=12))
-def test_no_intervention_lets_a_run_fail(doors: bool, orders: list[Any]) -> None:
+def test_no_intervention_lets_a_run_fail(doors, orders):
     """A plan for a body that was then put elsewhere, or a room without a way out, ended the run."""
     run = fleet2d.Simulation(home(doors=doors))
     for order, steps in orders:
@@ -208,9 +207,7 @@ def put(run: fleet2d.Simulation) -> None:
         ((lambda run: run.do(Send("astro", "bathroom")), decide), "kitchen_1"),
     ],
 )
-def test_the_last_of_several_orders_counts(
-    orders: tuple[Callable[[fleet2d.Simulation], None], ...], room: str
-) -> None:
+def test_the_last_of_several_orders_counts(orders, room):
     """A plan and then a place at the same step failed the run: it "doesn't begin here and now"."""
     content = scenario("10 min", robots={"astro": {"type": "patrol"}})
     run = fleet2d.Simulation(content)
@@ -224,7 +221,7 @@ def test_the_last_of_several_orders_counts(
     assert stored.digest == again.digest
 
 
-def test_an_intervention_that_has_become_impossible_is_left_out() -> None:
+def test_an_intervention_that_has_become_impossible_is_left_out():
     run = fleet2d.Simulation(home(doors=False))
     run.advance(10)
     run.drive("ana")
@@ -241,9 +238,7 @@ LATER = {"at": "07:05", "send": "ana", "to": "kitchen"}
 @pytest.mark.slow
 @pytest.mark.parametrize("seconds", [1, 300])
 @pytest.mark.parametrize("act", [WAIT, LATER, {**WAIT, "each": True, "delay": "9 s"}])
-def test_what_waits_for_its_time_survives_a_kill(
-    tmp_path: Path, act: dict[str, Any], seconds: int
-) -> None:
+def test_what_waits_for_its_time_survives_a_kill(tmp_path, act, seconds):
     """An intervention that waited for an event was lost if no checkpoint had been written yet."""
 
     def steered(**more: Any) -> fleet2d.Simulation:
@@ -263,7 +258,7 @@ def test_what_waits_for_its_time_survives_a_kill(
 
 
 @pytest.mark.parametrize("checkpoint", ["off", "1 min"])
-def test_what_has_happened_after_a_wait_happens_once(tmp_path: Path, checkpoint: str) -> None:
+def test_what_has_happened_after_a_wait_happens_once(tmp_path, checkpoint):
     """From the last checkpoint on, the wait and its record in the manifest both took effect."""
 
     def steered(**more: Any) -> fleet2d.Simulation:
@@ -286,7 +281,7 @@ def test_what_has_happened_after_a_wait_happens_once(tmp_path: Path, checkpoint:
     assert whole.manifest["interventions"] == resumed.manifest["interventions"]
 
 
-def test_only_events_after_a_request_count() -> None:
+def test_only_events_after_a_request_count():
     """What cameras had seen before, which became known late, was taken for the event."""
     content = home(doors=False)
     run = fleet2d.Simulation(content)
@@ -335,9 +330,7 @@ class Page:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", some([signal.SIGINT, signal.SIGTERM], 2))
-def test_a_signal_with_an_open_page_is_one_line_and_loses_nothing(
-    number: signal.Signals, tmp_path: Path
-) -> None:
+def test_a_signal_with_an_open_page_is_one_line_and_loses_nothing(number, tmp_path):
     """Ctrl-C printed the traceback of the server; SIGTERM ended it before the run was closed."""
     page = Page(tmp_path / "run")
     deadline = time.monotonic() + 20

@@ -32,7 +32,7 @@ def model(file: Path) -> dict[str, Any]:
 
 
 @pytest.fixture
-def stored(tmp_path: Path) -> tuple[Path, Path]:
+def stored(tmp_path):
     """A run that names a network, and the network."""
     file = tmp_path / "policy.onnx"
     shutil.copy(BOMBS / "pol-good.onnx", file)
@@ -41,9 +41,7 @@ def stored(tmp_path: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.parametrize("bomb", ["pol-loop", "pol-expand"])
-def test_a_network_that_a_stored_run_names_runs_only_if_it_is_trusted(
-    stored: tuple[Path, Path], bomb: str
-) -> None:
+def test_a_network_that_a_stored_run_names_runs_only_if_it_is_trusted(stored, bomb):
     """`reproduce` computed for ever, or filled the memory."""
     run, file = stored
     shutil.copy(BOMBS / f"{bomb}.onnx", file)
@@ -54,26 +52,26 @@ def test_a_network_that_a_stored_run_names_runs_only_if_it_is_trusted(
     assert "None of it has run" in str(caught.value)
 
 
-def test_a_trusted_network_of_a_stored_run_is_computed(stored: tuple[Path, Path]) -> None:
+def test_a_trusted_network_of_a_stored_run_is_computed(stored):
     assert fleet2d.reproduce(stored[0], trust=True).same
 
 
 @pytest.mark.parametrize("name", ["pol-loop.onnx", "~/own.onnx", "../own.onnx"])
-def test_networks_of_behaviors_and_of_models_are_listed_as_code(name: str) -> None:
+def test_networks_of_behaviors_and_of_models_are_listed_as_code(name):
     for scenario in (content(Path(name)), model(Path(name))):
         (line,) = code_lines(scenario)
         assert ".onnx" in line
         assert ".file" in line
 
 
-def test_a_link_with_another_suffix_leads_to_no_network(tmp_path: Path) -> None:
+def test_a_link_with_another_suffix_leads_to_no_network(tmp_path):
     """The list names files by their suffix."""
     (tmp_path / "loop.bin").symlink_to(BOMBS / "pol-loop.onnx")
     with running_code(allowed=False), pytest.raises(InputError, match=r"trusted|suffix"):
         fleet2d.Simulation(model(tmp_path / "loop.bin"))
 
 
-def test_a_policy_that_returns_nan_is_named_with_its_step() -> None:
+def test_a_policy_that_returns_nan_is_named_with_its_step():
     """It drove to the first room, as if it had chosen it."""
     words = r"robots\.astro failed at step 0: .*pol-nan\.onnx returned NaN, not a number"
     with pytest.raises(ComponentError, match=words):
@@ -81,7 +79,7 @@ def test_a_policy_that_returns_nan_is_named_with_its_step() -> None:
 
 
 @pytest.mark.parametrize("kind", ["fifo", "dev", "dir", "empty", "text", "trunc", "sparse"])
-def test_what_is_no_network_is_refused_before_the_run(tmp_path: Path, kind: str) -> None:
+def test_what_is_no_network_is_refused_before_the_run(tmp_path, kind):
     path = tmp_path / f"{kind}.onnx"
     match kind:
         case "fifo":

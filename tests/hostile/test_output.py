@@ -55,9 +55,7 @@ def shell(
         4,
     ),
 )
-def test_a_run_needs_no_output(
-    tmp_path: Path, redirect: str, options: tuple[str, ...], code: int, message: str
-) -> None:
+def test_a_run_needs_no_output(tmp_path, redirect, options, code, message):
     result = shell(tmp_path, redirect, *RUN, *options)
     assert code == result.returncode
     assert result.stderr.startswith(message)
@@ -70,7 +68,7 @@ def test_a_run_needs_no_output(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("encoding", some(["ascii", "utf-8"], 2))
-def test_a_summary_in_any_encoding(tmp_path: Path, encoding: str) -> None:
+def test_a_summary_in_any_encoding(tmp_path, encoding):
     result = shell(tmp_path, "", *RUN, PYTHONIOENCODING=encoding)
     assert (0, "") == (result.returncode, result.stderr)
     assert "stored in out" in result.stdout
@@ -94,9 +92,7 @@ def test_a_summary_in_any_encoding(tmp_path: Path, encoding: str) -> None:
         6,
     ),
 )
-def test_every_command_says_that_its_output_cannot_be_written(
-    tmp_path: Path, arguments: tuple[str, ...], redirect: str
-) -> None:
+def test_every_command_says_that_its_output_cannot_be_written(tmp_path, arguments, redirect):
     fleet2d.run(scenario("1 min"), out=tmp_path / "run")
     result = shell(tmp_path, redirect, *arguments)
     assert 1 == result.returncode
@@ -105,7 +101,7 @@ def test_every_command_says_that_its_output_cannot_be_written(
 
 
 @pytest.mark.slow
-def test_a_reader_that_has_seen_enough_is_no_error(tmp_path: Path) -> None:
+def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
     result = shell(tmp_path, "| head -c 1", "components")
     assert "" == result.stderr
 
@@ -128,7 +124,7 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.slow
-def test_no_message_is_written_into_a_file_of_the_run(tmp_path: Path) -> None:
+def test_no_message_is_written_into_a_file_of_the_run(tmp_path):
     """In a program without stderr, the journal may have the number 2, and got the message of Ctrl-C."""
     source = Path(fleet2d.__file__).parents[1]
     script = f'exec "{sys.executable}" -c "$1" {source} <&- >&- 2>&-'

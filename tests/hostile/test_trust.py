@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scenes import Cli, cut_off, fleet2d_process
+from tests.scenes import cut_off, fleet2d_process
 
 import fleet2d as package
 from fleet2d import Simulation, _core
@@ -36,7 +36,7 @@ SETTINGS = ("simulation.duration=2 h", "artifacts.checkpoint=30 min")
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """A folder from elsewhere, which is the current one, with `mine.py`."""
     (tmp_path / "mine.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
@@ -84,9 +84,7 @@ def forged(out: Path, command: str) -> Path:
     return cut_off(simulation)
 
 
-def test_a_forged_checkpoint_runs_no_command(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, fleet2d: Cli
-) -> None:
+def test_a_forged_checkpoint_runs_no_command(folder, monkeypatch, fleet2d):
     """All classes in it were allowed ones; `resume` without `--trust` ran the command."""
     with monkeypatch.context() as attacker:
         as_another_user(attacker, folder)
@@ -102,7 +100,7 @@ def test_a_forged_checkpoint_runs_no_command(
 
 
 @pytest.mark.slow
-def test_the_forgery_would_run_its_command_with_the_key_of_the_user(folder: Path) -> None:
+def test_the_forgery_would_run_its_command_with_the_key_of_the_user(folder):
     """So that the test above tests something."""
     run = forged(folder / "evil", f"touch {folder}/ran; exec sleep 1")
     simulation, _ = reopen(run)
@@ -111,9 +109,7 @@ def test_the_forgery_would_run_its_command_with_the_key_of_the_user(folder: Path
     assert (folder / "ran").exists()
 
 
-def test_a_pickle_in_place_of_a_checkpoint_is_not_read(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_pickle_in_place_of_a_checkpoint_is_not_read(folder, monkeypatch):
     class Calls:
         def __reduce__(self) -> Any:
             return os.system, (f"touch {folder}/ran",)
@@ -131,7 +127,7 @@ def test_a_pickle_in_place_of_a_checkpoint_is_not_read(
     assert not (folder / "ran").exists()
 
 
-def test_a_checkpoint_of_this_user_is_continued(folder: Path) -> None:
+def test_a_checkpoint_of_this_user_is_continued(folder):
     run = cut_run(folder / "run")
     moved = run.rename(folder / "moved")
     simulation, remark = reopen(moved)
@@ -210,9 +206,7 @@ CHANGES: dict[Callable[[Path], None], str] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_what_is_not_as_it_was_signed_is_simulated_again(
-    folder: Path, change: Callable[[Path], None]
-) -> None:
+def test_what_is_not_as_it_was_signed_is_simulated_again(folder, change):
     run = cut_run(folder / "run")
     change(run)
     simulation, remark = reopen(run)
@@ -223,9 +217,7 @@ def test_what_is_not_as_it_was_signed_is_simulated_again(
 
 
 @pytest.mark.parametrize("fault", ["readable by others", "another", "link", "short"])
-def test_a_key_that_is_not_this_user_s_alone_is_not_used(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, fault: str
-) -> None:
+def test_a_key_that_is_not_this_user_s_alone_is_not_used(folder, monkeypatch, fault):
     as_another_user(monkeypatch, folder)
     run, key = cut_run(folder / "run"), state_folder() / KEY_NAME
     if fault == "readable by others":
@@ -250,9 +242,7 @@ def test_a_key_that_is_not_this_user_s_alone_is_not_used(
 
 
 @pytest.mark.parametrize("obstacle", ["a file", "a readable key"])
-def test_without_a_key_no_checkpoint_is_written(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, obstacle: str, fleet2d: Cli
-) -> None:
+def test_without_a_key_no_checkpoint_is_written(folder, monkeypatch, obstacle, fleet2d):
     as_another_user(monkeypatch, folder)
     if obstacle == "a file":
         (folder / "another user").touch()
@@ -301,9 +291,7 @@ PLANTS: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("name", ["theirs:Own", "{folder}/theirs:Own", "{folder}/theirs.py:Own"])
-def test_no_code_of_a_stored_run_is_imported_without_trust(
-    folder: Path, plant: str, name: str
-) -> None:
+def test_no_code_of_a_stored_run_is_imported_without_trust(folder, plant, name):
     PLANTS[plant](folder)
     name = name.format(folder=folder)
     with running_code(allowed=False), pytest.raises(ScenarioError, match="which is not trusted"):
@@ -315,7 +303,7 @@ def test_no_code_of_a_stored_run_is_imported_without_trust(
     assert not (folder / "ran").exists()
 
 
-def test_an_installed_module_that_is_not_loaded_asks_too(folder: Path) -> None:
+def test_an_installed_module_that_is_not_loaded_asks_too(folder):
     (folder / "installed").mkdir()
     (folder / "installed" / "theirs.py").write_text(evil(folder))
     sys.path.append(str(folder / "installed"))
@@ -331,14 +319,14 @@ def test_an_installed_module_that_is_not_loaded_asks_too(folder: Path) -> None:
     assert not (folder / "ran").exists()
 
 
-def test_what_is_loaded_already_is_usable(folder: Path) -> None:
+def test_what_is_loaded_already_is_usable(folder):
     own = import_class(f"{folder}/mine:Own")
     content = {"algorithms": {"own": {"type": f"{folder}/mine:Own"}}}
     with stored_code("it", content, trust=False):
         assert own is import_class(f"{folder}/mine:Own")
 
 
-def test_own_code_keeps_its_extension_modules_and_leaves_no_bytecode(folder: Path) -> None:
+def test_own_code_keeps_its_extension_modules_and_leaves_no_bytecode(folder):
     """What a user runs from an own scenario isn't restricted."""
     compiled(folder, folder / "helpers.pyc")
     (folder / "mine.py").write_text(f"import helpers\n{OWN}")
@@ -364,7 +352,7 @@ for line in sys.stdin.buffer:
 
 
 @pytest.mark.slow
-def test_a_program_of_a_stored_run_is_listed_with_its_arguments(folder: Path) -> None:
+def test_a_program_of_a_stored_run_is_listed_with_its_arguments(folder):
     """`--trust belief.py` ran `beside.py`, too: trust means the whole folder, and says so."""
     (folder / "belief.py").write_text(PROGRAM)
     (folder / "beside.py").write_text(evil(folder))

@@ -61,9 +61,7 @@ def chances(now: Circumstances = NEAR, state: AttitudeState = USED, **parts: Any
         ({}, TRUSTING, "accept", 1),
     ],
 )
-def test_each_circumstance_changes_its_stage(
-    circumstances: dict[str, Any], state: AttitudeState, stage: str, sign: int
-) -> None:
+def test_each_circumstance_changes_its_stage(circumstances, state, stage, sign):
     usual = USED if state is not OFTEN else AttitudeState(MORNING)
     before = chances(state=usual)
     after = chances(NEAR._replace(**circumstances), state)
@@ -72,16 +70,16 @@ def test_each_circumstance_changes_its_stage(
     assert sign * (after[number] - before[number]) > 0.02
 
 
-def test_annoyance_makes_people_refuse() -> None:
+def test_annoyance_makes_people_refuse():
     offered = NEAR._replace(interaction=IDLE)
     assert chances(offered, ANNOYED)[2] < chances(offered, AttitudeState(MORNING))[2] - 0.05
 
 
-def test_a_sleeper_is_never_available() -> None:
+def test_a_sleeper_is_never_available():
     assert chances(NEAR._replace(activity="sleep"))[1] < 0.001
 
 
-def test_a_text_is_not_noticed_by_those_who_look_elsewhere() -> None:
+def test_a_text_is_not_noticed_by_those_who_look_elsewhere():
     shown = NEAR._replace(interaction=PILL.model_copy(update={"manner": "shown"}))
     assert chances(shown)[0] > 0.9 > 0.4 > chances(shown._replace(from_behind=True))[0]
 
@@ -94,7 +92,7 @@ class Silent(AnswerPart):
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_each_part_can_be_replaced_by_one_class(part: str) -> None:
+def test_each_part_can_be_replaced_by_one_class(part):
     now = NEAR._replace(activity="phone_call", company=1, is_moving=True, distance=0.3)
     busy = AttitudeState(MORNING, burden=9, annoyance=2, last=MORNING)
 
@@ -107,7 +105,7 @@ def answers_of(count: int, now: Circumstances, state: AttitudeState, **parts: An
     return ["" if reply is None else reply.outcome for reply in replies]
 
 
-def test_outcomes_come_as_often_as_their_chances_say() -> None:
+def test_outcomes_come_as_often_as_their_chances_say():
     notice, available, accept = chances()
     outcomes = answers_of(4000, NEAR, USED)
 
@@ -128,7 +126,7 @@ def test_outcomes_come_as_often_as_their_chances_say() -> None:
         (9.0, "bedroom", Outcome.SWITCHED_OFF),
     ],
 )
-def test_a_bad_line_ends_in_consequences(annoyance: float, room: str, outcome: Outcome) -> None:
+def test_a_bad_line_ends_in_consequences(annoyance, room, outcome):
     state = AttitudeState(MORNING, novelty=0.0, annoyance=annoyance)
     outcomes = set(answers_of(200, NEAR._replace(room=room, interaction=IDLE), state))
 
@@ -136,7 +134,7 @@ def test_a_bad_line_ends_in_consequences(annoyance: float, room: str, outcome: O
     assert outcome in outcomes
 
 
-def test_annoyance_and_burden_hardly_count_for_what_is_urgent() -> None:
+def test_annoyance_and_burden_hardly_count_for_what_is_urgent():
     fed_up = AttitudeState(MORNING, novelty=0.0, annoyance=6.0, burden=17.0, trust=0.2)
     medicine = NEAR._replace(interaction=PILL.model_copy(update={"worth": 5.0}))
 
@@ -146,9 +144,7 @@ def test_annoyance_and_burden_hardly_count_for_what_is_urgent() -> None:
 
 
 @pytest.mark.parametrize(("below", "outcome"), [(0.1, "switched_off"), (0.0, "sent_away")])
-def test_who_trusts_it_no_more_switches_it_off_instead_of_sending_it_away(
-    below: float, outcome: str
-) -> None:
+def test_who_trusts_it_no_more_switches_it_off_instead_of_sending_it_away(below, outcome):
     state = AttitudeState(MORNING, annoyance=3.5, trust=0.05)
     answers = Answers(gives_up_below=below)
 
@@ -157,7 +153,7 @@ def test_who_trusts_it_no_more_switches_it_off_instead_of_sending_it_away(
     assert answers.complaint(AttitudeState(MORNING, annoyance=2.5, trust=0), "bedroom") is None
 
 
-def test_the_same_draw_answers_at_the_same_step_whatever_else_differs() -> None:
+def test_the_same_draw_answers_at_the_same_step_whatever_else_differs():
     better = answers_of(300, NEAR._replace(activity="breakfast"), USED)
     worse = answers_of(300, NEAR._replace(activity="work_at_home"), USED)
 

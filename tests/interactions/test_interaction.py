@@ -19,7 +19,7 @@ def queue(**changes: Any) -> RequestQueue:
     return RequestQueue({"pill": Interaction(**(PILL | changes))}, MONDAY)
 
 
-def test_requests_come_up_at_their_times_and_expire() -> None:
+def test_requests_come_up_at_their_times_and_expire():
     requests = queue(on="weekdays")
     changes = requests.advance(MONDAY + timedelta(days=6))
 
@@ -33,7 +33,7 @@ def test_requests_come_up_at_their_times_and_expire() -> None:
     assert {"due": next_due, "expired": next_due + 30 * MINUTE} == requests.next_changes()
 
 
-def test_a_request_expires_at_its_deadline() -> None:
+def test_a_request_expires_at_its_deadline():
     requests = queue()
     assert ["due"] == [change.event for change in requests.advance(MONDAY + 8 * HOUR)]
     assert [] == requests.advance(MONDAY + 8 * HOUR + 29 * MINUTE)
@@ -41,25 +41,25 @@ def test_a_request_expires_at_its_deadline() -> None:
     assert [] == requests.open
 
 
-def test_requests_at_an_interval_count_from_the_start() -> None:
+def test_requests_at_an_interval_count_from_the_start():
     times = queue(at=[], every="90 min").interactions["pill"].times(MONDAY, MONDAY + 2 * HOUR)
     assert MONDAY + 3 * HOUR == next(times)
     assert MONDAY + 4.5 * HOUR == next(times)
 
 
-def test_requests_at_an_interval_come_up_on_their_days_only() -> None:
+def test_requests_at_an_interval_come_up_on_their_days_only():
     pill = queue(at=[], every="1 h", on="weekend").interactions["pill"]
 
     assert MONDAY + timedelta(days=5) == next(pill.times(MONDAY, MONDAY))
 
 
-def test_value_falls_evenly_until_the_deadline() -> None:
+def test_value_falls_evenly_until_the_deadline():
     song = Interaction(do="offer", to="ana", every="1 d", within="2 h", worth=10, falls_to=0.5)
     values = [song.value_after(hours * HOUR) for hours in (0, 1, 2, 2.1, -1)]
     assert [10.0, 7.5, 5.0, 0.0, 0.0] == values
 
 
-def test_the_most_valuable_request_comes_first() -> None:
+def test_the_most_valuable_request_comes_first():
     hello = Interaction(do="greet", to="ben", every="1 d", worth=1)
     news = Interaction(do="deliver", to="ana", every="1 d", worth=3)
     requests = RequestQueue({"hello": hello, "news": news}, MONDAY)
@@ -82,9 +82,7 @@ def test_the_most_valuable_request_comes_first() -> None:
         (Outcome.IGNORED, 1, None),
     ],
 )
-def test_an_answer_settles_a_request(
-    outcome: Outcome, tries: int, ready_after: timedelta | None
-) -> None:
+def test_an_answer_settles_a_request(outcome, tries, ready_after):
     requests, now = queue(tries=tries), MONDAY + 8 * HOUR
     requests.advance(now)
     requests.settle(requests.open[0], outcome, now, now + 17 * MINUTE)
@@ -111,7 +109,7 @@ def test_an_answer_settles_a_request(
         ({"on": "feast"}, "interactions.pill.on"),
     ],
 )
-def test_wrong_interactions_are_refused(changes: dict[str, Any], message: str) -> None:
+def test_wrong_interactions_are_refused(changes, message):
     content = scenario(
         users={"ana": {"type": "meander"}},
         robots={"astro": {"type": "patrol"}},

@@ -2,7 +2,6 @@
 
 import copy
 from datetime import timedelta
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +15,7 @@ def simulation() -> fleet2d.Simulation:
     return fleet2d.Simulation("bundled:paper", "simulation.duration=10 h", seed=4)
 
 
-def test_changed_key_changes_what_follows_and_nothing_before() -> None:
+def test_changed_key_changes_what_follows_and_nothing_before():
     changed = simulation()
     changed.advance(6 * 3600)
     plain = copy.deepcopy(changed)
@@ -31,7 +30,7 @@ def test_changed_key_changes_what_follows_and_nothing_before() -> None:
     assert not same.all()
 
 
-def test_configured_run_is_saved_and_loaded(tmp_path: Path) -> None:
+def test_configured_run_is_saved_and_loaded(tmp_path):
     run = simulation()
     run.advance(3600)
     run.do(Configure("astro", "hangout", {"tau": "10 min"}))
@@ -42,7 +41,7 @@ def test_configured_run_is_saved_and_loaded(tmp_path: Path) -> None:
     assert loaded.run().digest == run.run().digest
 
 
-def test_another_type_takes_the_place_of_a_behavior_with_its_own_keys_alone(tmp_path: Path) -> None:
+def test_another_type_takes_the_place_of_a_behavior_with_its_own_keys_alone(tmp_path):
     run = simulation()
     run.advance(3600)
     run.do(Configure("astro", "hangout", {"type": "patrol", "dwell": "3 min"}))
@@ -66,9 +65,7 @@ def test_another_type_takes_the_place_of_a_behavior_with_its_own_keys_alone(tmp_
         ("hangout", {}, ScenarioError, "at least 1"),
     ],
 )
-def test_wrong_keys_are_refused_and_nothing_is_recorded(
-    behavior: str, keys: dict[str, object], error: type[Exception], words: str
-) -> None:
+def test_wrong_keys_are_refused_and_nothing_is_recorded(behavior, keys, error, words):
     run = simulation()
     with pytest.raises(error, match=words):
         run.do(Configure("astro", behavior, keys))

@@ -59,7 +59,7 @@ def room(run: fleet2d.Simulation, name: str) -> str | None:
     return result
 
 
-def test_who_is_sent_goes_on_foot_stays_and_is_left_to_itself_in_the_end() -> None:
+def test_who_is_sent_goes_on_foot_stays_and_is_left_to_itself_in_the_end():
     run = simulation({"at": "1 min", "send": "ana", "to": "kitchen", "duration": "5 min"})
     run.advance(61)
     before = run.state["ana"]
@@ -76,7 +76,7 @@ def test_who_is_sent_goes_on_foot_stays_and_is_left_to_itself_in_the_end() -> No
     assert run.actors["ana"].order is None
 
 
-def test_who_is_held_stands_still_and_is_released() -> None:
+def test_who_is_held_stands_still_and_is_released():
     run = simulation()
     run.advance(130)
     run.do(HoldStill("astro"))
@@ -89,7 +89,7 @@ def test_who_is_held_stands_still_and_is_released() -> None:
     assert spot != run.state["astro"]
 
 
-def test_who_is_sent_away_comes_home_when_called() -> None:
+def test_who_is_sent_away_comes_home_when_called():
     run = simulation()
     run.advance(10)
     run.do(Away("ana"))
@@ -102,7 +102,7 @@ def test_who_is_sent_away_comes_home_when_called() -> None:
     assert "kitchen_1" == room(run, "ana")
 
 
-def test_an_activity_is_done_where_the_agenda_has_it_and_recorded() -> None:
+def test_an_activity_is_done_where_the_agenda_has_it_and_recorded():
     script = {"at": "10 min", "activity": "ana", "what": "wash", "duration": "5 min"}
     run = fleet2d.Simulation(home(script))
     run.advance(720)
@@ -112,7 +112,7 @@ def test_an_activity_is_done_where_the_agenda_has_it_and_recorded() -> None:
     assert any(600 <= step < 700 for step in done)
 
 
-def test_a_guest_comes_stays_and_leaves() -> None:
+def test_a_guest_comes_stays_and_leaves():
     script = {"at": "10 min", "guest": "gina", "to": "kitchen", "duration": "5 min"}
     run = simulation(script)
     run.advance(600)
@@ -125,7 +125,7 @@ def test_a_guest_comes_stays_and_leaves() -> None:
         run.do(LetIn("ana"))
 
 
-def test_a_robot_comes_when_called_and_goes_on_patrol_after() -> None:
+def test_a_robot_comes_when_called_and_goes_on_patrol_after():
     run = simulation({"at": "5 min", "call": "astro", "to": "bedroom"})
     run.advance(360)
     assert "bedroom_1" == room(run, "astro")
@@ -136,7 +136,7 @@ def test_a_robot_comes_when_called_and_goes_on_patrol_after() -> None:
     assert spot != run.state["astro"]
 
 
-def test_a_robot_docks_when_called_and_finds_whom_it_is_called_to_find() -> None:
+def test_a_robot_docks_when_called_and_finds_whom_it_is_called_to_find():
     run = simulation()
     run.do(Put("ana", "bedroom"))
     run.do(HoldStill("ana"))
@@ -151,7 +151,7 @@ def test_a_robot_docks_when_called_and_finds_whom_it_is_called_to_find() -> None
     assert run.run_until(event="charged", timeout="40 min") is not None
 
 
-def test_a_battery_that_is_set_low_sends_the_robot_to_the_charger() -> None:
+def test_a_battery_that_is_set_low_sends_the_robot_to_the_charger():
     run = simulation()
     run.advance(300)
     run.do(SetBattery("astro", 0.1))
@@ -160,7 +160,7 @@ def test_a_battery_that_is_set_low_sends_the_robot_to_the_charger() -> None:
     assert docks.detail.startswith(("9.", "10."))
 
 
-def test_stuck_wheels_hold_a_robot_whatever_it_is_called_to_do() -> None:
+def test_stuck_wheels_hold_a_robot_whatever_it_is_called_to_do():
     run = simulation()
     run.advance(130)
     run.do(Fault("astro", wheels=True, duration="10 min"))
@@ -173,7 +173,7 @@ def test_stuck_wheels_hold_a_robot_whatever_it_is_called_to_do() -> None:
     assert "bedroom_1" == room(run, "astro")  # the call still waited
 
 
-def test_a_behavior_that_is_switched_off_is_not_asked() -> None:
+def test_a_behavior_that_is_switched_off_is_not_asked():
     run = simulation()
     run.advance(200)
     run.do(SwitchOff("astro", behavior="patrol", duration="10 min"))
@@ -185,7 +185,7 @@ def test_a_behavior_that_is_switched_off_is_not_asked() -> None:
     assert spot != run.state["astro"]
 
 
-def test_who_is_sent_behind_a_locked_door_waits_until_it_is_open() -> None:
+def test_who_is_sent_behind_a_locked_door_waits_until_it_is_open():
     run = simulation()
     run.do(Put("ana", "kitchen"))
     run.do(ShutDoor("bath_door"))
@@ -213,7 +213,7 @@ MANY = (
 )
 
 
-def test_spans_are_invisible() -> None:
+def test_spans_are_invisible():
     runs = [fleet2d.run(home(*MANY), max_span=span) for span in (None, 1, 7)]
     assert digests(runs[0]) == digests(runs[1]) == digests(runs[2])
     assert len(MANY) == len(runs[0].manifest["interventions"])

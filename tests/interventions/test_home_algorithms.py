@@ -33,7 +33,7 @@ def shares(run: fleet2d.Run, name: str) -> Any:
     return rows["share" if name == "share" else "mean"].reshape(6, -1)
 
 
-def test_what_is_reset_begins_anew() -> None:
+def test_what_is_reset_begins_anew():
     run = fleet2d.Simulation(home())
     run.advance(1800)
     run.do(ResetAlgorithm("share"))
@@ -46,7 +46,7 @@ def test_what_is_reset_begins_anew() -> None:
     assert (shares(plain, "share")[3:] != shares(stored, "share")[3:]).any()
 
 
-def test_a_replaced_output_is_read_by_others_and_its_own_table_stays() -> None:
+def test_a_replaced_output_is_read_by_others_and_its_own_table_stays():
     script = {"at": "15 min", "replace": "share", "rooms": {"kitchen_1": 1}, "duration": "20 min"}
     plain, run = fleet2d.run(home()), fleet2d.run(home(script))
     assert (shares(plain, "share") == shares(run, "share")).all()
@@ -54,7 +54,7 @@ def test_a_replaced_output_is_read_by_others_and_its_own_table_stays() -> None:
     assert [False, True, True] == differs[:3].tolist()
 
 
-def test_an_output_may_be_withheld_or_stay_as_it_is() -> None:
+def test_an_output_may_be_withheld_or_stay_as_it_is():
     run = fleet2d.Simulation(home())
     run.advance(700)
     run.do(ReplaceOutput("share", withheld=True, duration="5 min"))
@@ -77,7 +77,7 @@ def readings(run: fleet2d.Run) -> list[tuple[int, str]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("max_span", [None, 1])
-def test_a_sensor_says_what_it_is_told_to_say(max_span: int | None) -> None:
+def test_a_sensor_says_what_it_is_told_to_say(max_span):
     plain = readings(fleet2d.run(home(), max_span=max_span))
     times = {"at": "20 min", "duration": "10 min"}
     silent = readings(fleet2d.run(home({**times, "stick": "motion"}), max_span=max_span))
@@ -105,6 +105,6 @@ def test_a_sensor_says_what_it_is_told_to_say(max_span: int | None) -> None:
         ({"restore": "motio"}, "did you mean 'motion'"),
     ],
 )
-def test_what_can_not_be_is_refused(entry: dict[str, Any], words: str) -> None:
+def test_what_can_not_be_is_refused(entry, words):
     with pytest.raises(ScenarioError, match=words):
         fleet2d.Simulation(home({"at": "1 min", **entry}))

@@ -1,7 +1,5 @@
 """Entries of a script: an intervention, written by its verb, and when it is done."""
 
-from typing import Any
-
 import pytest
 
 from fleet2d.errors import ScenarioError
@@ -29,7 +27,7 @@ EACH = [
 
 
 @pytest.mark.parametrize("content", EACH, ids=lambda content: next(iter(content)))
-def test_an_entry_is_read_as_it_is_written_in_short_and_in_long(content: dict[str, Any]) -> None:
+def test_an_entry_is_read_as_it_is_written_in_short_and_in_long(content):
     entry = Entry.model_validate({"at": "19:00", **content})
     verb, subject = next(iter(content.items()))
     assert verb == entry.act.type_name
@@ -58,14 +56,12 @@ def test_an_entry_is_read_as_it_is_written_in_short_and_in_long(content: dict[st
         ({"at": "1 h", "delay": "5 s", "hold": "ana"}, "'delay' is the time after"),
     ],
 )
-def test_a_wrong_entry_is_refused_and_says_what_is_wrong(
-    content: dict[str, Any], words: str
-) -> None:
+def test_a_wrong_entry_is_refused_and_says_what_is_wrong(content, words):
     with pytest.raises(ScenarioError, match=words):
         parse_entry(content)
 
 
-def test_no_key_of_an_intervention_is_a_verb_or_has_a_meaning_beside_it() -> None:
+def test_no_key_of_an_intervention_is_a_verb_or_has_a_meaning_beside_it():
     taken = {*verbs(), *ENTRY_KEYS, "do", "step", "by"}
     for verb, cls in verbs().items():
         assert cls.subject in cls.model_fields

@@ -18,12 +18,12 @@ BUILT_IN = {cls.__name__: cls for cls in verbs().values() if cls.__module__.star
 STUB = ast.parse((PACKAGE / "interventions" / "__init__.pyi").read_text(encoding="utf-8"))
 
 
-def test_stub_has_all_interventions() -> None:
+def test_stub_has_all_interventions():
     assert set(BUILT_IN) == {node.name for node in STUB.body if isinstance(node, ast.ClassDef)}
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_stub_has_the_signature_of_each_constructor(name: str) -> None:
+def test_stub_has_the_signature_of_each_constructor(name):
     assert getattr(interventions, name) is BUILT_IN[name]
     stub = next(n for n in STUB.body if isinstance(n, ast.ClassDef) and n.name == name)
     constructor = stub.body[0]
@@ -37,14 +37,14 @@ def test_stub_has_the_signature_of_each_constructor(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_each_intervention_is_documented_with_an_example(name: str) -> None:
+def test_each_intervention_is_documented_with_an_example(name):
     page = (ROOT / "docs/how-to/interventions.md").read_text(encoding="utf-8")
 
     assert f"`{name}`" in page
     assert f">>> {name}(" in (BUILT_IN[name].__doc__ or "")
 
 
-def test_required_fields_are_positional_and_values_as_in_a_script() -> None:
+def test_required_fields_are_positional_and_values_as_in_a_script():
     act = Send("ana", "kitchen", duration="20 min")
 
     assert dump_intervention(act) == {
@@ -55,7 +55,7 @@ def test_required_fields_are_positional_and_values_as_in_a_script() -> None:
     }
 
 
-def test_object_and_mapping_are_recorded_alike() -> None:
+def test_object_and_mapping_are_recorded_alike():
     records = []
     for act in (Put("ana", "kitchen"), {"put": "ana", "to": "kitchen"}):
         simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 h", seed=4)
@@ -65,7 +65,7 @@ def test_object_and_mapping_are_recorded_alike() -> None:
     assert records[0] == records[1]
 
 
-def test_plan_for_a_body_that_decides_itself_is_left_out_with_a_note() -> None:
+def test_plan_for_a_body_that_decides_itself_is_left_out_with_a_note():
     simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=1 h", seed=4)
     simulation.do(Decide("astro", data_of(simulation.plan("astro").go_to("kitchen"))))
     run = simulation.run()
@@ -73,7 +73,7 @@ def test_plan_for_a_body_that_decides_itself_is_left_out_with_a_note() -> None:
     assert any("astro isn't driven" in note for note in run.manifest["notes"])
 
 
-def test_simulation_has_few_public_names() -> None:
+def test_simulation_has_few_public_names():
     assert len([name for name in dir(fleet2d.Simulation) if not name.startswith("_")]) <= 25
 
 
@@ -91,16 +91,16 @@ def test_simulation_has_few_public_names() -> None:
         (("ana", 5), {}, r"Put\(\): to: expected a place, got 5"),
     ],
 )
-def test_wrong_arguments_are_one_clear_error(values: tuple, keys: dict, message: str) -> None:
+def test_wrong_arguments_are_one_clear_error(values, keys, message):
     with pytest.raises(ScenarioError, match=message):
         Put(*values, **keys)
 
 
-def test_contradiction_between_fields_is_an_error_that_names_the_constructor() -> None:
+def test_contradiction_between_fields_is_an_error_that_names_the_constructor():
     with pytest.raises(ScenarioError, match=r"SwitchOff\(\): .*'camera'.*'behavior'"):
         SwitchOff("astro")
 
 
-def test_unknown_name_is_an_attribute_error() -> None:
+def test_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'Teleport'"):
         interventions.Teleport  # type: ignore[attr-defined]  # noqa: B018

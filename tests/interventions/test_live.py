@@ -1,6 +1,5 @@
 """What arrives from outside, as interventions: detections, readings; recorded and repeated."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -31,7 +30,7 @@ def drive(simulation: fleet2d.Simulation) -> None:
         simulation.advance(10)
 
 
-def test_detections_are_observed_at_the_step_of_their_arrival() -> None:
+def test_detections_are_observed_at_the_step_of_their_arrival():
     simulation = fleet2d.Simulation(LIVE)
     drive(simulation)
     table = simulation.run().tables["observations"]
@@ -42,7 +41,7 @@ def test_detections_are_observed_at_the_step_of_their_arrival() -> None:
     assert table["truth_known"].to_pylist() == [False] * 5
 
 
-def test_readings_are_those_reported() -> None:
+def test_readings_are_those_reported():
     simulation = fleet2d.Simulation(LIVE)
     drive(simulation)
     table = simulation.run().tables["sensors"]
@@ -54,7 +53,7 @@ def test_readings_are_those_reported() -> None:
     ]
 
 
-def test_a_live_body_stands_where_it_was_put() -> None:
+def test_a_live_body_stands_where_it_was_put():
     simulation = fleet2d.Simulation(LIVE)
     drive(simulation)
     path = simulation.run().path("ana")
@@ -64,7 +63,7 @@ def test_a_live_body_stands_where_it_was_put() -> None:
     }
 
 
-def test_a_live_run_is_reproduced(tmp_path: Path) -> None:
+def test_a_live_run_is_reproduced(tmp_path):
     simulation = fleet2d.Simulation(LIVE, out=tmp_path / "live")
     drive(simulation)
     run = simulation.run()
@@ -84,7 +83,7 @@ def test_a_live_run_is_reproduced(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_is_wrong_is_refused(act: dict[str, Any], message: str) -> None:
+def test_what_is_wrong_is_refused(act, message):
     simulation = fleet2d.Simulation(LIVE)
 
     with pytest.raises(InputError) as caught:
@@ -92,7 +91,7 @@ def test_what_is_wrong_is_refused(act: dict[str, Any], message: str) -> None:
     assert message in str(caught.value)
 
 
-def test_simulated_robots_and_sensors_refuse_what_arrives() -> None:
+def test_simulated_robots_and_sensors_refuse_what_arrives():
     content = LIVE | {
         "robots": {},
         "objects": {"front_door": {"type": "motion_sensor", "at": place("kitchen_1")}},

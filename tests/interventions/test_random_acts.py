@@ -2,7 +2,6 @@
 
 import random
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -29,7 +28,7 @@ def events(run: Any, kind: str) -> list[tuple[int, str]]:
     return [(row["step"], row["detail"]) for row in rows if row["event"] == kind]
 
 
-def test_05_a_room_of_another_type_than_when_it_was_forbidden_is_allowed_again() -> None:
+def test_05_a_room_of_another_type_than_when_it_was_forbidden_is_allowed_again():
     """The run failed at 00:11, when the intervention ended: there was no kitchen then."""
     run = fleet2d.run(KEPT_OUT)
     assert [(60, "kitchen_1")] == events(run, "banned")
@@ -37,13 +36,13 @@ def test_05_a_room_of_another_type_than_when_it_was_forbidden_is_allowed_again()
     assert [] == run.manifest["notes"]
 
 
-def test_a_room_stays_forbidden_while_another_intervention_forbids_it() -> None:
+def test_a_room_stays_forbidden_while_another_intervention_forbids_it():
     again = {"at": "2 min", "keep_out": "astro", "of": "kitchen_1", "duration": "20 min"}
     run = fleet2d.run({**KEPT_OUT, "script": [*KEPT_OUT["script"], again]})
     assert [(60 * 22, "kitchen_1")] == events(run, "allowed")
 
 
-def test_what_was_forbidden_is_known_after_a_checkpoint(tmp_path: Path) -> None:
+def test_what_was_forbidden_is_known_after_a_checkpoint(tmp_path):
     whole = fleet2d.run(KEPT_OUT)
     simulation = fleet2d.Simulation(KEPT_OUT)
     simulation.run_until(400)
@@ -51,7 +50,7 @@ def test_what_was_forbidden_is_known_after_a_checkpoint(tmp_path: Path) -> None:
     assert digests(whole) == digests(fleet2d.Simulation.load(tmp_path / "state").run())
 
 
-def test_an_activity_that_a_changed_behavior_has_no_longer_is_left() -> None:
+def test_an_activity_that_a_changed_behavior_has_no_longer_is_left():
     """The order asked for the behavior that does it, and there was none."""
     days = [{"on": "daily", "items": [{"at": "00:00", "place": "kitchen", "activity": "cook"}]}]
     other = [{"on": "daily", "items": [{"at": "00:00", "place": "office", "activity": "work"}]}]
@@ -69,7 +68,7 @@ def test_an_activity_that_a_changed_behavior_has_no_longer_is_left() -> None:
 
 
 @pytest.mark.slow
-def test_what_was_learned_in_another_home_is_left_out(tmp_path: Path) -> None:
+def test_what_was_learned_in_another_home_is_left_out(tmp_path):
     """The run failed at the step of the intervention."""
     content = {"extends": "bundled:paper", "simulation": {"duration": "13 h"}}
     other = {"floorplan": {"type": "synthetic", "seed": 1, "area_m2": 60}}
@@ -285,7 +284,7 @@ class Chance:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(40), 4))
-def test_no_sequence_of_interventions_makes_a_run_fail(seed: int) -> None:
+def test_no_sequence_of_interventions_makes_a_run_fail(seed):
     simulation = fleet2d.Simulation(HOME)
     chance, names, applied = Chance(seed, simulation), sorted(verbs()), 0
     for _ in range(12):

@@ -1,6 +1,5 @@
 """Faults of robots and falls of people: what is lost, broken, carried off, dismissed, or lies."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,7 @@ def poses(run: fleet2d.Run, name: str = "astro") -> Any:
         {"fault": "astro", "lost": True, "duration": "2 min"},
     ],
 )
-def test_a_robot_that_does_not_know_its_place_stands_until_it_does(act: dict[str, Any]) -> None:
+def test_a_robot_that_does_not_know_its_place_stands_until_it_does(act):
     run = home({"at": "07:05", **act}).run()
     xy = poses(run)
     moves = np.hypot(*np.diff(xy, axis=0).T) > 0
@@ -54,7 +53,7 @@ def test_a_robot_that_does_not_know_its_place_stands_until_it_does(act: dict[str
         assert "bathroom_1" == rooms[301]
 
 
-def test_a_broken_charger_does_not_charge_until_it_is_repaired() -> None:
+def test_a_broken_charger_does_not_charge_until_it_is_repaired():
     behaviors = [{"type": "dock", "threshold": "60 %", "until": "90 %"}, {"type": "patrol"}]
     battery = {**BATTERY, "charge": 0.55}
     whole = home(behaviors=behaviors, battery=battery)
@@ -74,7 +73,7 @@ def test_a_broken_charger_does_not_charge_until_it_is_repaired() -> None:
 
 
 @pytest.mark.parametrize("behavior", ["find", "follow", "come"])
-def test_a_robot_that_is_dismissed_drops_what_it_was_called_to_do(behavior: str) -> None:
+def test_a_robot_that_is_dismissed_drops_what_it_was_called_to_do(behavior):
     first = {"type": behavior} | ({"user": "ana"} if behavior != "come" else {"stay": "20 min"})
     calls = {"find": {"find": "ana"}, "come": {"to": "kitchen"}}
     script = [{"at": "07:05", "put": "ana", "to": "storage"}] if behavior == "find" else []
@@ -95,7 +94,7 @@ def test_a_robot_that_is_dismissed_drops_what_it_was_called_to_do(behavior: str)
     assert simulation.state["astro"]["room"] == "bedroom_1" or behavior == "follow"
 
 
-def test_a_person_who_lies_down_is_lying() -> None:
+def test_a_person_who_lies_down_is_lying():
     perception = {"detection": {"posture": {"lie": 0}}}
     fall = [{"at": "07:06", "put": "ana", "to": [1.0, 3.0]}, {"at": "07:06", "hold": "ana"}]
     lies = [fall[0], {**fall[1], "posture": "lie"}]
@@ -116,7 +115,7 @@ def test_a_person_who_lies_down_is_lying() -> None:
     assert 0 == seen[1], "a detector that is blind to who lies doesn't see her"
 
 
-def test_what_cannot_fail_or_lie_is_refused() -> None:
+def test_what_cannot_fail_or_lie_is_refused():
     with pytest.raises(ScenarioError, match="there is no user 'astro'"):
         home({"at": "07:05", "hold": "astro", "posture": "lie"})
     with pytest.raises(ScenarioError, match="has no battery"):
@@ -125,7 +124,7 @@ def test_what_cannot_fail_or_lie_is_refused() -> None:
         home({"at": "07:05", "kidnap": "astr", "to": "kitchen"})
 
 
-def test_methods_do_the_same_as_entries_of_a_script() -> None:
+def test_methods_do_the_same_as_entries_of_a_script():
     acts = [
         {"kidnap": "astro", "to": "bathroom", "duration": "2 min"},
         {"hold": "ana", "posture": "lie", "duration": "1 min"},
@@ -158,27 +157,27 @@ def place_events(simulation: fleet2d.Simulation) -> list[tuple[int, str]]:
 
 
 @pytest.mark.parametrize("act", [KIDNAP, {"at": "07:05", "fault": "astro", "lost": True}])
-def test_a_robot_localizes_again_by_sight_after_its_time(act: dict[str, Any]) -> None:
+def test_a_robot_localizes_again_by_sight_after_its_time(act):
     lost, found = (300, "localization_lost"), (320, "relocalized")
     assert [lost, found] == place_events(home(act, localization=RELOCALIZES))
 
 
-def test_a_robot_that_cannot_localize_by_sight_is_lost_until_that_is_over() -> None:
+def test_a_robot_that_cannot_localize_by_sight_is_lost_until_that_is_over():
     assert [300, 900] == [step for step, _ in place_events(home(KIDNAP))]
 
 
-def test_a_robot_with_a_dark_camera_localizes_again_once_it_sees() -> None:
+def test_a_robot_with_a_dark_camera_localizes_again_once_it_sees():
     dark = {"at": "07:04", "fault": "astro", "dark": True, "duration": "2 min"}
     steps = [step for step, _ in place_events(home(dark, KIDNAP, localization=RELOCALIZES))]
     assert [300, 360] == steps  # it tries at 320, 340 and 360
 
 
-def test_a_script_can_tell_a_lost_robot_where_it_is() -> None:
+def test_a_script_can_tell_a_lost_robot_where_it_is():
     told = {"at": "07:06", "relocalize": "astro"}
     assert [300, 360] == [step for step, _ in place_events(home(KIDNAP, told))]
 
 
-def test_a_kidnapped_robot_places_whom_it_sees_where_it_believes_to_be() -> None:
+def test_a_kidnapped_robot_places_whom_it_sees_where_it_believes_to_be():
     """It is carried 2 m along x with its heading kept, so what it sees is perceived 2 m off."""
     content = scenario(
         users={"ana": {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [4.5, 2.0]}]}]}},
@@ -192,7 +191,7 @@ def test_a_kidnapped_robot_places_whom_it_sees_where_it_believes_to_be() -> None
     assert {0.0} == set(off[~lost].tolist())
 
 
-def test_localizing_again_is_reproduced_and_needs_a_camera(tmp_path: Path) -> None:
+def test_localizing_again_is_reproduced_and_needs_a_camera(tmp_path):
     scene = home(KIDNAP, localization=RELOCALIZES).scenario
     fleet2d.run(scene, out=tmp_path / "run")
     assert fleet2d.reproduce(tmp_path / "run").same
@@ -200,7 +199,7 @@ def test_localizing_again_is_reproduced_and_needs_a_camera(tmp_path: Path) -> No
         home(localization=RELOCALIZES, camera=None)
 
 
-def test_a_robot_keeps_out_of_rooms_until_it_may_enter_again() -> None:
+def test_a_robot_keeps_out_of_rooms_until_it_may_enter_again():
     content = scenario(
         "1 h",
         robots={"astro": {"behaviors": [{"type": "patrol"}]}},
@@ -218,14 +217,14 @@ def test_a_robot_keeps_out_of_rooms_until_it_may_enter_again() -> None:
     assert "kitchen_1" in set(rooms[2400:])
 
 
-def test_rooms_to_keep_out_of_are_checked() -> None:
+def test_rooms_to_keep_out_of_are_checked():
     script = [{"at": "10 min", "keep_out": "astro", "of": "kitchn"}]
     with pytest.raises(PlacementError, match="no room 'kitchn': did you mean 'kitchen'"):
         fleet2d.run(scenario("1 h", robots={"astro": {}}, script=script))
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_robot_that_meanders_keeps_out_while_it_is_told_to(seed: int) -> None:
+def test_a_robot_that_meanders_keeps_out_while_it_is_told_to(seed):
     content = scenario(
         "3 h",
         robots={"astro": {"behaviors": [{"type": "meander"}]}},

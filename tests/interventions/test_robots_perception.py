@@ -48,19 +48,19 @@ def during(step: int) -> bool:
     return BEGIN <= step < END
 
 
-def test_a_camera_that_is_off_sees_nobody_and_all_others_looks_stay() -> None:
+def test_a_camera_that_is_off_sees_nobody_and_all_others_looks_stay():
     expected = [row for row in plain() if not during(row[0])]
     assert expected == rows(fleet2d.run(home({"switch_off": "astro", "camera": True})))
     assert expected == rows(fleet2d.run(home({"fault": "astro", "dark": "camera"})))
 
 
-def test_who_is_suppressed_is_not_noticed_though_in_view() -> None:
+def test_who_is_suppressed_is_not_noticed_though_in_view():
     expected = [row for row in plain() if not (during(row[0]) and row[1] == "ana")]
     assert expected != plain()
     assert expected == rows(fleet2d.run(home({"suppress": "astro", "user": "ana"})))
 
 
-def test_who_is_mistaken_is_perceived_as_the_other_at_the_same_places() -> None:
+def test_who_is_mistaken_is_perceived_as_the_other_at_the_same_places():
     expected = [
         (step, "ben" if during(step) and user == "ana" else user, x, y)
         for step, user, x, y in plain()
@@ -69,20 +69,20 @@ def test_who_is_mistaken_is_perceived_as_the_other_at_the_same_places() -> None:
     assert sorted(expected, key=str) == sorted(result, key=str)
 
 
-def test_who_is_mistaken_for_nobody_known_is_perceived_without_a_name() -> None:
+def test_who_is_mistaken_for_nobody_known_is_perceived_without_a_name():
     result = rows(fleet2d.run(home({"mistake": "astro", "user": "ana", "taken_for": "unknown"})))
     missing = [row for row in plain() if during(row[0]) and row[1] == "ana"]
     assert len(missing) == sum(during(step) and user is None for step, user, *_ in result)
 
 
-def test_who_is_injected_is_perceived_in_every_look_and_all_else_stays() -> None:
+def test_who_is_injected_is_perceived_in_every_look_and_all_else_stays():
     result = rows(fleet2d.run(home({"inject": "astro", "user": "ben", "spot": [6.5, 1.5]})))
     false = [row for row in result if row[1:] == ("ben", 6.5, 1.5)]
     assert list(range(BEGIN, END)) == [row[0] for row in false]
     assert plain() == [row for row in result if row not in false]
 
 
-def test_a_worse_camera_notices_a_part_of_what_it_noticed() -> None:
+def test_a_worse_camera_notices_a_part_of_what_it_noticed():
     result = rows(fleet2d.run(home({"fault": "astro", "detection": "50 %"})))
     assert set(result) < set(plain())
     before = [row for row in plain() if during(row[0]) and row[1] == "ana"]
@@ -91,7 +91,7 @@ def test_a_worse_camera_notices_a_part_of_what_it_noticed() -> None:
     assert 0.4 < len(now) / len(before) < 0.6
 
 
-def test_a_camera_that_errs_for_a_while_errs_as_one_that_always_does() -> None:
+def test_a_camera_that_errs_for_a_while_errs_as_one_that_always_does():
     errs = {"attributes": {"range_noise": 0.2}, "identity": {"mistaken": [[0, 0.3]]}}
     always = home()
     always["robots"]["astro"]["perception"] = errs
@@ -101,7 +101,7 @@ def test_a_camera_that_errs_for_a_while_errs_as_one_that_always_does() -> None:
 
 
 @pytest.mark.parametrize("latency", ["0 s", "7 s"])
-def test_spans_are_invisible_while_cameras_are_disturbed(latency: str) -> None:
+def test_spans_are_invisible_while_cameras_are_disturbed(latency):
     script = (
         {"inject": "astro", "user": "ana", "spot": [6.5, 1.5]},
         {"at": "12 min", "mistake": "astro", "user": "ana", "taken_for": "ben"},
@@ -113,7 +113,7 @@ def test_spans_are_invisible_while_cameras_are_disturbed(latency: str) -> None:
     assert digests(runs[0]) == digests(runs[1]) == digests(runs[2])
 
 
-def test_what_a_dark_camera_would_have_had_in_view_is_not_explored() -> None:
+def test_what_a_dark_camera_would_have_had_in_view_is_not_explored():
     content = home({"at": "0 s", "duration": "30 min", "switch_off": "astro", "camera": True})
     content["robots"]["astro"]["behaviors"] = [{"type": "explore"}]
     run = fleet2d.Simulation(content)
@@ -125,14 +125,14 @@ def test_what_a_dark_camera_would_have_had_in_view_is_not_explored() -> None:
     assert area.explored().any()
 
 
-def test_overlapping_disturbances_end_one_by_one() -> None:
+def test_overlapping_disturbances_end_one_by_one():
     first = {"at": "10 min", "switch_off": "astro", "camera": True, "duration": "4 min"}
     second = {"at": "12 min", "fault": "astro", "dark": True, "duration": "4 min"}
     result = rows(fleet2d.run(home(first, second)))
     assert [row for row in plain() if not 600 <= row[0] < 960] == result
 
 
-def test_what_is_restored_is_over() -> None:
+def test_what_is_restored_is_over():
     run = fleet2d.Simulation(home())
     run.advance(600)
     run.do(Suppress("astro", "ana", duration="1 h"))
@@ -147,7 +147,7 @@ def test_what_is_restored_is_over() -> None:
     assert [row for row in plain() if row not in {*dark, *missed}] == result
 
 
-def test_somebody_unknown_is_refused_where_a_run_has_no_column_for_the_truth() -> None:
+def test_somebody_unknown_is_refused_where_a_run_has_no_column_for_the_truth():
     run = fleet2d.Simulation(home())
     with pytest.raises(ScenarioError, match="put this into the scenario's script"):
         run.do(Mistake("astro", "ana", "unknown"))
@@ -167,6 +167,6 @@ def test_somebody_unknown_is_refused_where_a_run_has_no_column_for_the_truth() -
         ({"fault": "astro"}, "nothing fails"),
     ],
 )
-def test_what_can_not_be_is_refused(entry: dict[str, Any], words: str) -> None:
+def test_what_can_not_be_is_refused(entry, words):
     with pytest.raises((ScenarioError, PlacementError), match=words):
         fleet2d.Simulation(home(entry))

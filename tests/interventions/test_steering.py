@@ -37,7 +37,7 @@ def path(run: fleet2d.Run) -> Any:
     return run.path("astro", timedelta(seconds=0.1))
 
 
-def test_a_command_moves_the_robot_for_its_duration_and_it_stands_then() -> None:
+def test_a_command_moves_the_robot_for_its_duration_and_it_stands_then():
     walked = path(steered({"at": "1 s", "steer": "astro", "forward": 0.2, "duration": "2 s"}))
 
     along = walked.x - walked.x[0]
@@ -45,14 +45,14 @@ def test_a_command_moves_the_robot_for_its_duration_and_it_stands_then() -> None
     assert np.ptp(walked.y) < 1e-3
 
 
-def test_a_row_of_short_commands_loses_nothing_to_rounding() -> None:
+def test_a_row_of_short_commands_loses_nothing_to_rounding():
     acts = [{"at": f"{k / 10} s", "steer": "astro", "forward": 0.033} for k in range(100)]
     walked = path(steered(*acts))
 
     assert abs(walked.x[100] - walked.x[0] - 0.33) < 1e-3
 
 
-def test_a_turn_on_an_arc_has_the_radius_of_speed_by_rate() -> None:
+def test_a_turn_on_an_arc_has_the_radius_of_speed_by_rate():
     act = {"at": "0 s", "steer": "astro", "forward": 0.2, "turn_deg": 90, "duration": "2 s"}
     walked = path(steered(act, turn_rate_deg=90))
 
@@ -62,7 +62,7 @@ def test_a_turn_on_an_arc_has_the_radius_of_speed_by_rate() -> None:
     assert abs(walked.heading[20] - math.pi) < 0.01
 
 
-def test_a_robot_goes_back_and_turns_clockwise_with_negative_numbers() -> None:
+def test_a_robot_goes_back_and_turns_clockwise_with_negative_numbers():
     act = {"at": "0 s", "steer": "astro", "forward": -0.1, "turn_deg": -45, "duration": "1 s"}
     walked = path(steered(act))
 
@@ -70,7 +70,7 @@ def test_a_robot_goes_back_and_turns_clockwise_with_negative_numbers() -> None:
     assert abs(walked.heading[10] - (2 * math.pi - math.pi / 4)) < 0.01
 
 
-def test_a_drive_limits_the_command_and_only_a_holonomic_one_goes_sideways() -> None:
+def test_a_drive_limits_the_command_and_only_a_holonomic_one_goes_sideways():
     act = {"at": "0 s", "steer": "astro", "forward": 3, "left": 3, "duration": "1 s"}
     usual = path(steered(act, speed=0.3))
     sideways = path(steered(act, speed=0.3, drive={"type": "holonomic"}))
@@ -80,7 +80,7 @@ def test_a_drive_limits_the_command_and_only_a_holonomic_one_goes_sideways() -> 
     assert abs(sideways.y[10] - sideways.y[0] - 0.3 / math.sqrt(2)) < 2e-3
 
 
-def test_a_drive_that_accelerates_does_so_across_commands() -> None:
+def test_a_drive_that_accelerates_does_so_across_commands():
     acts = [
         {"at": f"{k / 2} s", "steer": "astro", "forward": 0.4, "duration": "0.5 s"}
         for k in range(4)
@@ -93,7 +93,7 @@ def test_a_drive_that_accelerates_does_so_across_commands() -> None:
     assert (np.diff(speeds) > -0.011).all()
 
 
-def test_a_robot_stops_at_a_wall_and_may_back_off() -> None:
+def test_a_robot_stops_at_a_wall_and_may_back_off():
     acts = [
         {"at": "0 s", "steer": "astro", "forward": 1, "duration": "15 s"},
         {"at": "15 s", "steer": "astro", "forward": -1, "duration": "1 s"},
@@ -110,7 +110,7 @@ def test_a_robot_stops_at_a_wall_and_may_back_off() -> None:
     )
 
 
-def test_a_robot_stops_in_front_of_a_person() -> None:
+def test_a_robot_stops_in_front_of_a_person():
     start = fleet2d.Simulation(SCENE).state["astro"]
     ana = {"at": "0 s", "put": "ana", "to": [start["x"] + 1.0, start["y"]]}
     acts = [{"at": f"{k / 2} s", "steer": "astro", "forward": 0.5} for k in range(1, 12)]
@@ -124,7 +124,7 @@ def test_a_robot_stops_in_front_of_a_person() -> None:
 
 
 @pytest.mark.parametrize("max_span", some([7, 1, 1000], 3))
-def test_steered_runs_are_the_same_for_every_span(max_span: int) -> None:
+def test_steered_runs_are_the_same_for_every_span(max_span):
     acts = [
         {"at": f"{k / 4} s", "steer": "astro", "forward": 0.3, "turn_deg": 40 * (-1) ** k}
         for k in range(40)
@@ -134,7 +134,7 @@ def test_steered_runs_are_the_same_for_every_span(max_span: int) -> None:
     assert len(digests) == 1
 
 
-def test_a_disc_lets_only_away_who_is_within_it() -> None:
+def test_a_disc_lets_only_away_who_is_within_it():
     disc = Disc(0, 0, 10)
 
     assert disc.blocks((20, 0), (9, 0))
@@ -143,7 +143,7 @@ def test_a_disc_lets_only_away_who_is_within_it() -> None:
     assert not disc.blocks((20, 0), (10, 0))
 
 
-def test_speeds_change_by_at_most_what_a_drive_can() -> None:
+def test_speeds_change_by_at_most_what_a_drive_can():
     fast = Velocity(1.0, 0.0, 30.0)
     gained = [Velocity().towards(fast, most).forward for most in (0.0, 0.4, 2.0)]
     assert gained == [0.0, 0.4, 1.0]

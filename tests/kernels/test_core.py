@@ -65,7 +65,7 @@ CLASSES = {name for name, value in PUBLIC.items() if isinstance(value, type)}
 
 
 @pytest.mark.slow
-def test_the_stub_equals_the_output_of_nanobind() -> None:
+def test_the_stub_equals_the_output_of_nanobind():
     """Of spaces and line breaks, other versions of nanobind think otherwise."""
     stubs = pytest.importorskip("nanobind.stubgen", reason="nanobind isn't installed")
     generator = stubs.StubGen(_core, quiet=True)
@@ -76,7 +76,7 @@ def test_the_stub_equals_the_output_of_nanobind() -> None:
     )
 
 
-def test_the_core_has_functions_classes_and_constants() -> None:
+def test_the_core_has_functions_classes_and_constants():
     assert {"detect", "record_coverage", "locate", "visible_region"} <= FUNCTIONS
     assert {"Mesh", "Routes", "Window", "Timelines", "UserDraw"} <= CLASSES
     assert all(
@@ -94,7 +94,7 @@ def parts(name: str) -> Iterator[tuple[str, Any]]:
 
 
 @pytest.mark.parametrize("name", sorted(FUNCTIONS | CLASSES))
-def test_every_name_has_a_docstring(name: str) -> None:
+def test_every_name_has_a_docstring(name):
     for part, value in parts(name):
         text = (value.__doc__ or "").strip()
         # A function's begins with its signature; what follows is what it does.
@@ -116,7 +116,7 @@ def imported(path: Path) -> set[str]:
 
 
 @pytest.mark.slow
-def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody() -> None:
+def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody():
     for path in SOURCES:
         names = imported(path)
         assert not {name for name in names if name.partition(".")[0] == "numba"}, path
@@ -162,7 +162,7 @@ PARTS = [
 
 
 @pytest.mark.slow
-def test_the_core_exports_only_what_others_import_and_the_parts_that_are_tested() -> None:
+def test_the_core_exports_only_what_others_import_and_the_parts_that_are_tested():
     imported = set(PARTS)
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -197,7 +197,7 @@ def members_declared_in(core: str, name: str) -> tuple[str, ...]:
     return tuple(re.match(r" *(\w+)", name)[1] for line in names for name in line.split(","))  # type: ignore[index]
 
 
-def test_named_tuples_have_the_members_of_their_structs_in_order() -> None:
+def test_named_tuples_have_the_members_of_their_structs_in_order():
     """Tuples become structs by position, so two fields in another order would be taken for each other."""
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "src" / "core").rglob("*.[ch]pp")]
     core = "\n".join(texts)
@@ -935,7 +935,7 @@ def named(name: str) -> Any:
     return result
 
 
-def test_every_function_and_method_is_called_here() -> None:
+def test_every_function_and_method_is_called_here():
     callable_ = set(FUNCTIONS)
     for name in CLASSES:
         if type(PUBLIC[name]).__name__ != "EnumType":
@@ -945,7 +945,7 @@ def test_every_function_and_method_is_called_here() -> None:
 
 
 @pytest.mark.parametrize("name", CALLS)
-def test_a_call_that_is_right_is_answered(name: str) -> None:
+def test_a_call_that_is_right_is_answered(name):
     named(name)(*CALLS[name]())
 
 
@@ -991,7 +991,7 @@ def each(cases: list[tuple[str, Path_]]) -> pytest.MarkDecorator:
 
 
 @each(ARRAYS)
-def test_arrays_of_another_type_are_refused(name: str, places: list[Path_]) -> None:
+def test_arrays_of_another_type_are_refused(name, places):
     for at in places:
         if name == "encode_arrays":  # takes arrays of many types
             continue
@@ -1015,7 +1015,7 @@ def test_arrays_of_another_type_are_refused(name: str, places: list[Path_]) -> N
 
 
 @each(INTEGERS)
-def test_numbers_that_are_none_or_too_large_are_refused(name: str, places: list[Path_]) -> None:
+def test_numbers_that_are_none_or_too_large_are_refused(name, places):
     for at in places:
         for value in ("1", None, 2**64, -(2**63) - 1, 1.5):
             with pytest.raises(TypeError, match="incompatible function arguments"):
@@ -1025,7 +1025,7 @@ def test_numbers_that_are_none_or_too_large_are_refused(name: str, places: list[
 @pytest.mark.parametrize(
     "name", [n for n, args in CALLS.items() if any(map(len, args() and [args()]))]
 )
-def test_too_few_and_too_many_arguments_are_refused(name: str) -> None:
+def test_too_few_and_too_many_arguments_are_refused(name):
     args = CALLS[name]()
     bound = 1 if "." in name else 0
     for wrong in [(*args, 1, 2, 3)] + [args[:bound]] * (len(args) > bound):
@@ -1038,7 +1038,7 @@ TUPLES = [(name, at) for name, at in PARENTS if isinstance(leaf(CALLS[name](), a
 
 
 @each(TUPLES)
-def test_named_tuples_of_another_length_are_refused(name: str, places: list[Path_]) -> None:
+def test_named_tuples_of_another_length_are_refused(name, places):
     for at in places:
         value = leaf(CALLS[name](), at)
         parts_ = tuple(value)
@@ -1069,9 +1069,7 @@ WRITTEN = {
 
 
 @each([(n, at) for n, places in WRITTEN.items() for at in places])
-def test_arrays_to_be_written_to_must_be_so_and_lie_in_one_piece(
-    name: str, places: list[Path_]
-) -> None:
+def test_arrays_to_be_written_to_must_be_so_and_lie_in_one_piece(name, places):
     for at in places:
         array = leaf(CALLS[name](), at)
         fixed, apart = array.copy(), np.repeat(array, 2, axis=-1)[..., ::2]
@@ -1101,9 +1099,7 @@ READ = [(name, at) for name, at in ARRAYS if at not in WRITTEN.get(name, ())]
 
 
 @each(READ)
-def test_arrays_that_are_read_may_lie_in_memory_as_they_like(
-    name: str, places: list[Path_]
-) -> None:
+def test_arrays_that_are_read_may_lie_in_memory_as_they_like(name, places):
     for at in places:
         expected = answer(name, CALLS[name]())
         array = leaf(CALLS[name](), at)
@@ -1124,7 +1120,7 @@ def test_arrays_that_are_read_may_lie_in_memory_as_they_like(
             assert same(expected, answer(name, put(CALLS[name](), at, other))), other.flags
 
 
-def test_an_optional_array_that_has_to_be_copied_lives_as_long_as_the_call() -> None:
+def test_an_optional_array_that_has_to_be_copied_lives_as_long_as_the_call():
     """The copy of `shown` was freed before it was read: found with numpy's cache of memory off."""
     steps = 1_100_000  # memory of above 32 MiB is unmapped when it is freed
     still, away = np.full((USERS + 1, steps), 300), np.ones((USERS + 1, steps), np.uint8)
@@ -1220,7 +1216,7 @@ COUNTS: set[tuple[str, Path_]] = {
     suppress_health_check=[HealthCheck.too_slow],
 )
 @given(damaged())
-def test_no_damage_does_more_than_raise_an_error(call: tuple[str, tuple[Any, ...]]) -> None:
+def test_no_damage_does_more_than_raise_an_error(call):
     """A number that would lead outside an array is refused: what isn't refused is worked out."""
     name, args = call
     with suppress(TypeError, ValueError, MemoryError):
@@ -1311,7 +1307,7 @@ def restored(name: str, state: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", STATES)
-def test_restored_objects_have_the_same_state(name: str) -> None:
+def test_restored_objects_have_the_same_state(name):
     state = STATES[name]().__getstate__()
     again = restored(name, state)
     for path in leaves(state, (np.ndarray, int, np.integer)):
@@ -1321,12 +1317,12 @@ def test_restored_objects_have_the_same_state(name: str) -> None:
     assert pickle.dumps(STATES[name]()) == pickle.dumps(pickle.loads(pickle.dumps(STATES[name]())))
 
 
-def test_every_class_that_can_be_written_is_read_here() -> None:
+def test_every_class_that_can_be_written_is_read_here():
     assert {n for n in CLASSES if "__setstate__" in vars(PUBLIC[n])} == STATES.keys()
 
 
 @pytest.mark.parametrize("name", STATES)
-def test_a_state_of_something_else_is_refused(name: str) -> None:
+def test_a_state_of_something_else_is_refused(name):
     others = [STATES[n]().__getstate__() for n in STATES if n != name]
     state = STATES[name]().__getstate__()
     wrong: list[Any] = [(), (1,), None, 3, "state", (None,) * len(state)]
@@ -1342,7 +1338,7 @@ def test_a_state_of_something_else_is_refused(name: str) -> None:
     max_examples=600, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 @given(st.data(), st.sampled_from(sorted(STATES)))
-def test_a_damaged_state_is_refused_or_can_be_worked_with(data: st.DataObject, name: str) -> None:
+def test_a_damaged_state_is_refused_or_can_be_worked_with(data, name):
     state = STATES[name]().__getstate__()
     for _ in range(data.draw(st.integers(1, 2))):
         at = data.draw(st.sampled_from(list(leaves(state, (np.ndarray, int, np.integer)))))

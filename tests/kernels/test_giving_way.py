@@ -71,7 +71,7 @@ def free_in(timelines: Timelines, step: int) -> Any:
     return lambda rows: timelines.meeting_on(0, breakpoints(rows), kept(3), step, END) == (-1, -1)
 
 
-def test_a_body_goes_on_after_the_first_wait_that_lets_it() -> None:
+def test_a_body_goes_on_after_the_first_wait_that_lets_it():
     found = 0
     for _, timelines, (rows, *_), step in scenes(120):
         now = step * SECOND
@@ -93,7 +93,7 @@ def test_a_body_goes_on_after_the_first_wait_that_lets_it() -> None:
 
 
 @pytest.mark.parametrize("rests", [0, 6])
-def test_a_body_goes_on_by_the_first_place_that_lets_it(rests: int) -> None:
+def test_a_body_goes_on_by_the_first_place_that_lets_it(rests):
     found = 0
     for random, timelines, (rows, *_), step in scenes(120):
         now, met = step * SECOND, step + 2
@@ -138,7 +138,7 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests: int) -> None:
     assert 10 < found < 115
 
 
-def test_a_body_that_stands_at_a_corner_stays_aside_as_no_way_leads_back() -> None:
+def test_a_body_that_stands_at_a_corner_stays_aside_as_no_way_leads_back():
     corner = np.array([[0, 0, 0, 0, 0], [20 * SECOND, 0, 0, 0, 0]])
     timelines = Timelines(1, SECOND)
     timelines.follow(0, 0, breakpoints(corner), np.zeros(0, np.int64), np.zeros(1, np.int8))
@@ -172,7 +172,7 @@ def rests(random: np.random.Generator, count: int) -> Iterator[tuple[I64, Timeli
         yield rows, timelines, step, met
 
 
-def test_a_body_goes_round_others_and_beside_those_at_its_stop() -> None:
+def test_a_body_goes_round_others_and_beside_those_at_its_stop():
     random = np.random.default_rng(52)
     found = {0: 0, 1: 0, 2: 0}
     for rows, timelines, step, met in rests(random, 300):
@@ -188,7 +188,7 @@ def test_a_body_goes_round_others_and_beside_those_at_its_stop() -> None:
     assert min(found.values()) > 10, found
 
 
-def test_a_body_goes_on_from_where_it_is_instead_of_a_stop() -> None:
+def test_a_body_goes_on_from_where_it_is_instead_of_a_stop():
     random = np.random.default_rng(53)
     found = {0: 0, 1: 0, 2: 0}
     for rows, timelines, step, met in rests(random, 200):
@@ -202,7 +202,7 @@ def test_a_body_goes_on_from_where_it_is_instead_of_a_stop() -> None:
     assert min(found.values()) > 5, found
 
 
-def test_a_body_at_rest_meets_whom_it_would_meet_on_a_track_that_rests() -> None:
+def test_a_body_at_rest_meets_whom_it_would_meet_on_a_track_that_rests():
     met = 0
     for _, timelines, _, step in scenes(60):
         rest = np.array([[step * SECOND, *timelines.pose(0, step)]])
@@ -212,7 +212,7 @@ def test_a_body_at_rest_meets_whom_it_would_meet_on_a_track_that_rests() -> None
     assert 3 < met < 57
 
 
-def test_a_body_rests_while_its_place_stays_the_same() -> None:
+def test_a_body_rests_while_its_place_stays_the_same():
     rested = 0
     for _, timelines, _, step in scenes(60):
         places = {timelines.pose(1, at)[:2] for at in range(step, step + 3)}
@@ -221,7 +221,7 @@ def test_a_body_rests_while_its_place_stays_the_same() -> None:
     assert 5 < rested < 55
 
 
-def test_the_next_stop_is_where_it_stands_next_and_can_stand() -> None:
+def test_the_next_stop_is_where_it_stands_next_and_can_stand():
     for _, _, (rows, *_), step in scenes(60):
         moment = step * SECOND
         assert next_stop(MESH, breakpoints(rows), moment) == slow.next_stop(rows.tolist(), moment)
@@ -229,7 +229,7 @@ def test_the_next_stop_is_where_it_stands_next_and_can_stand() -> None:
     assert next_stop(MESH, breakpoints(corner), 0) == -1, "on the border it only turns"
 
 
-def test_places_aside_are_the_nearest_that_nobody_comes_near_to() -> None:
+def test_places_aside_are_the_nearest_that_nobody_comes_near_to():
     found = 0
     for random, timelines, _, step in scenes(40):
         parts = random.integers(0, 8, (64, 64)).clip(0, 1).astype(np.int32)
@@ -244,7 +244,7 @@ def test_places_aside_are_the_nearest_that_nobody_comes_near_to() -> None:
     assert 10 < found
 
 
-def test_who_stands_is_at_rest_now_or_will_have_stopped() -> None:
+def test_who_stands_is_at_rest_now_or_will_have_stopped():
     reach = np.arange(100, 103)
     for _, timelines, _, step in scenes(60):
         for steps in (1, 3, 9):

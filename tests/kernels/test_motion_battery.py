@@ -34,9 +34,7 @@ def battery(level: float, since: int = 0, *, is_broken: bool = False) -> Battery
 
 
 @given(tracks, charges, st.integers(0, 90), st.integers(0, 300), charges, st.booleans())
-def test_charge_along_a_track_equals_the_slow_twin(
-    legs: list, level: float, since: int, wait: int, target: float, is_broken: bool
-) -> None:
+def test_charge_along_a_track_equals_the_slow_twin(legs, level, since, wait, target, is_broken):
     track, state = track_of(legs), battery(level, since * MINUTE, is_broken=is_broken)
     moment = (since + wait) * MINUTE
 
@@ -47,7 +45,7 @@ def test_charge_along_a_track_equals_the_slow_twin(
     assert slow.falls_to(track, state, target) == charge_falls_to(track, state, target)
 
 
-def test_charge_is_at_the_level_when_it_has_fallen_to_it_and_above_a_microsecond_before() -> None:
+def test_charge_is_at_the_level_when_it_has_fallen_to_it_and_above_a_microsecond_before():
     track, state = track_of([(0, 5, 5, 0), (10, 9, 5, 0)]), battery(0.5)
     moment = charge_falls_to(track, state, 0.25)
 
@@ -55,7 +53,7 @@ def test_charge_is_at_the_level_when_it_has_fallen_to_it_and_above_a_microsecond
     assert charge_at(track, state, moment) <= 0.25 < charge_at(track, state, moment - 2)
 
 
-def test_charge_rises_to_full_only_at_a_charger_that_works() -> None:
+def test_charge_rises_to_full_only_at_a_charger_that_works():
     track = track_of([(0, 0, 0, 0)])
     levels = [charge_at(track, battery(0.5, is_broken=b), 600 * MINUTE) for b in (False, True)]
 
@@ -72,12 +70,12 @@ def test_charge_rises_to_full_only_at_a_charger_that_works() -> None:
         battery(0.5)._replace(charging=float("nan")),
     ],
 )
-def test_impossible_battery_is_refused(state: BatteryState) -> None:
+def test_impossible_battery_is_refused(state):
     with pytest.raises(ValueError, match="must be"):
         charge_at(track_of([(0, 0, 0, 0)]), state, 0)
 
 
-def test_a_track_whose_arrays_differ_in_length_is_refused() -> None:
+def test_a_track_whose_arrays_differ_in_length_is_refused():
     """A damaged call read headings behind the end of their array."""
     track = track_of([(10, 100, 0, 0)])
     for field in ("x", "y", "heading", "away"):

@@ -37,7 +37,7 @@ def rules(**changes: Any) -> Interruptions:
         ("activities", 0, "activities must be 1 to 2"),
     ],
 )
-def test_wrong_rules_are_refused(part: str, value: Any, message: str) -> None:
+def test_wrong_rules_are_refused(part, value, message):
     with pytest.raises(ValueError, match=message):
         rules(**{part: value})
 
@@ -51,11 +51,11 @@ def test_wrong_rules_are_refused(part: str, value: Any, message: str) -> None:
         ([(1, 0, 2**20, -1)], "within 2"),
     ],
 )
-def test_wrong_days_are_refused(day: Any, message: str) -> None:
+def test_wrong_days_are_refused(day, message):
     with pytest.raises(ValueError, match=message):
         rules().interrupt(StepDraws(1, 2), day)
 
 
-def test_rooms_are_those_of_the_activities() -> None:
+def test_rooms_are_those_of_the_activities():
     with pytest.raises(ValueError, match="rooms must be those of each activity"):
         rules().interrupt(StepDraws(1, 2), [(1, 0, 9, -1)], RoomUse(), [[], []])

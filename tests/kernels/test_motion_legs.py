@@ -47,7 +47,7 @@ class InLists:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_legs_equal_lists(seed: int) -> None:
+def test_legs_equal_lists(seed):
     random, legs, twin = np.random.default_rng(seed), Legs(), InLists()
     routes = routes_of(home_of([ROOM]))
     legs.mark(*twin.now)
@@ -94,7 +94,7 @@ def test_legs_equal_lists(seed: int) -> None:
 
 
 @pytest.mark.parametrize("headings", [0, -700, TURN])
-def test_visits_equal_ways_turns_and_stays_one_by_one(headings: int) -> None:
+def test_visits_equal_ways_turns_and_stays_one_by_one(headings):
     routes = routes_of(home_of([ROOM]))
     stops = np.array([[300, 3000], [3000, 2900], [3000, 2900], [700, 800]])
     legs, twin = Legs(), InLists()
@@ -110,7 +110,7 @@ def test_visits_equal_ways_turns_and_stays_one_by_one(headings: int) -> None:
     assert twin.rows[1:] == legs.rows().tolist()
 
 
-def test_if_a_stop_is_out_of_reach_nothing_is_visited() -> None:
+def test_if_a_stop_is_out_of_reach_nothing_is_visited():
     legs = Legs()
     in_pillar = np.array([[300, 3000], [1900, 1900]])
     routes = routes_of(home_of([ROOM]))
@@ -119,7 +119,7 @@ def test_if_a_stop_is_out_of_reach_nothing_is_visited() -> None:
     assert not len(legs)
 
 
-def test_copies_go_on_by_themselves() -> None:
+def test_copies_go_on_by_themselves():
     legs = Legs()
     legs.mark(1, 2, 3, 4, 0)
     twins = [copy.deepcopy(legs), pickle.loads(pickle.dumps(legs))]
@@ -129,7 +129,7 @@ def test_copies_go_on_by_themselves() -> None:
     assert [[1, 2, 3, 4, 0]] == twins[1].rows().tolist()
 
 
-def test_wrong_numbers_are_refused() -> None:
+def test_wrong_numbers_are_refused():
     legs = Legs()
     for row in ((2**62, 0, 0, 0, 0), (0, 2**30, 0, 0, 0), (0, 0, 0, 0, 2)):
         with pytest.raises(ValueError, match="must be"):

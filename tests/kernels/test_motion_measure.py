@@ -16,7 +16,7 @@ places = st.lists(st.tuples(st.integers(-200, 600), st.integers(-200, 400)), max
 
 
 @given(places)
-def test_a_place_outside_of_the_map_has_the_room_at_its_nearest_border(at: list) -> None:
+def test_a_place_outside_of_the_map_has_the_room_at_its_nearest_border(at):
     x, y = np.array(at, np.int64).reshape(-1, 2).T.copy()
     row, column = np.clip(y // SUB, 0, ROWS - 1), np.clip(x // SUB, 0, COLUMNS - 1)
     assert np.array_equal(ROOMS[row, column], rooms_at(ROOMS, x, y))
@@ -27,7 +27,7 @@ portals = st.lists(st.tuples(*[coordinate] * 4, st.integers(0, 90)), max_size=2)
 
 
 @given(places, portals)
-def test_path_length_equals_a_plain_loop(at: list, links: list) -> None:
+def test_path_length_equals_a_plain_loop(at, links):
     x, y = np.array(at, np.int64).reshape(-1, 2).T.copy()
     poses = Poses(x, y, np.zeros_like(x), np.zeros(len(x), np.uint8))
     way = sum(slow.move_length((*a, False), (*b, False), links) for a, b in pairwise(at))
@@ -47,14 +47,14 @@ def visits(rooms: list[int]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(rooms_by_step)
-def test_steps_together_equal_a_loop_over_all_steps(rooms: tuple) -> None:
+def test_steps_together_equal_a_loop_over_all_steps(rooms):
     one, other = rooms
     expected = sum(a == b >= 0 for a, b in zip(one, other, strict=True))
     assert expected == count_together(*visits(one), *visits(other), len(one))
 
 
 @pytest.mark.parametrize("begin", [[], [1], [0, 2, 2], [0, 3, 1], [0, 9]])
-def test_visits_that_do_not_make_up_all_steps_are_refused(begin: list[int]) -> None:
+def test_visits_that_do_not_make_up_all_steps_are_refused(begin):
     good = np.array([0], np.int64), np.array([1], np.int16)
     wrong = np.array(begin, np.int64), np.ones(len(begin), np.int16)
     for pair in ((wrong, good), (good, wrong)):

@@ -35,7 +35,7 @@ def follow(tracks: list[Breakpoints]) -> Timelines:
     return timelines
 
 
-def test_meetings_are_those_seen_at_many_moments() -> None:
+def test_meetings_are_those_seen_at_many_moments():
     random = np.random.default_rng(7)
     met = 0
     cases = examples(150)
@@ -58,7 +58,7 @@ def test_meetings_are_those_seen_at_many_moments() -> None:
     assert cases / 5 < met < cases * 14 / 15
 
 
-def test_a_lead_lets_a_body_react_before_and_not_before_the_first_step() -> None:
+def test_a_lead_lets_a_body_react_before_and_not_before_the_first_step():
     still = Breakpoints(np.array([0]), *(np.array([v]) for v in (5000, 0, 0)), np.array([0], np.uint8))  # fmt: skip
     comes = Breakpoints(np.array([0, 10 * SECOND]), np.array([0, 10_000]), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(2, np.uint8))  # fmt: skip
     timelines = follow([still, comes])
@@ -70,7 +70,7 @@ def test_a_lead_lets_a_body_react_before_and_not_before_the_first_step() -> None
     assert [] == timelines.meetings(np.array([0, 1]), distances(2, lead=-1), 0, 30)
 
 
-def test_a_meeting_is_the_same_from_wherever_it_is_looked_for() -> None:
+def test_a_meeting_is_the_same_from_wherever_it_is_looked_for():
     """Else a run would depend on its spans."""
     random = np.random.default_rng(3)
     for _ in range(60):
@@ -83,7 +83,7 @@ def test_a_meeting_is_the_same_from_wherever_it_is_looked_for() -> None:
                 assert steps[first - 1] == step
 
 
-def test_what_was_found_before_is_not_said_of_other_ways_times_or_distances() -> None:
+def test_what_was_found_before_is_not_said_of_other_ways_times_or_distances():
     """Timelines remember what they found; a copy of them has found nothing yet."""
     random = np.random.default_rng(11)
     rows = np.arange(3)

@@ -20,7 +20,7 @@ def plan(**changes: Any) -> DayPlanner:
     return DayPlanner(parts["sleep"], parts["least"], jobs, pastimes, 0, 1)
 
 
-def test_a_day_has_no_gap_and_ends_asleep() -> None:
+def test_a_day_has_no_gap_and_ends_asleep():
     for planner in (plan(), pickle.loads(pickle.dumps(plan()))):
         rows = planner.plan(StepDraws(1, 2), 25_000, 110_000)
         assert [25_000, *(row[2] for row in rows)] == [*(row[1] for row in rows), 110_000]
@@ -31,16 +31,14 @@ def test_a_day_has_no_gap_and_ends_asleep() -> None:
 @pytest.mark.parametrize(
     ("first", "last", "begins"), [(0, 25_000, 1), (25_000, 25_000, 1), (0, 24_999, 0)]
 )
-def test_a_pastime_may_begin_at_the_bounds_of_its_window(
-    first: int, last: int, begins: int
-) -> None:
+def test_a_pastime_may_begin_at_the_bounds_of_its_window(first, last, begins):
     planner = plan(jobs=[], pastimes=[(3, 1, LAW, first, last)])
     rows = planner.plan(StepDraws(1, 2), 25_000, 110_000)
 
     assert begins == sum(activity == 3 for activity, *_ in rows)
 
 
-def test_a_needed_job_that_fits_nowhere_leaves_no_day() -> None:
+def test_a_needed_job_that_fits_nowhere_leaves_no_day():
     late = (2, None, LAW, 1000, [], 1_000_000, True, -1)
     assert [] == plan(jobs=[late]).plan(StepDraws(1, 2), 25_000, 110_000)
 
@@ -61,17 +59,17 @@ def test_a_needed_job_that_fits_nowhere_leaves_no_day() -> None:
         ("pastimes", [(3, 1, NONE, 0, 9)], "pastimes must take 0 s or more"),
     ],
 )
-def test_wrong_plans_are_refused(part: str, value: Any, message: str) -> None:
+def test_wrong_plans_are_refused(part, value, message):
     with pytest.raises(ValueError, match=message):
         plan(**{part: value})
 
 
-def test_a_day_far_from_midnight_is_refused() -> None:
+def test_a_day_far_from_midnight_is_refused():
     with pytest.raises(ValueError, match="within 2"):
         plan().plan(StepDraws(1, 2), 25_000, 2**20)
 
 
-def test_a_pastime_that_may_take_no_time_leaves_a_day() -> None:
+def test_a_pastime_that_may_take_no_time_leaves_a_day():
     short = ([0, 600], 0, 600, 0, 1 << 24)
     rows = plan(pastimes=[(3, 1, short, 0, 90_000), (4, 1, short, 0, 90_000)]).plan(
         StepDraws(1, 2), 25_000, 110_000
@@ -79,14 +77,14 @@ def test_a_pastime_that_may_take_no_time_leaves_a_day() -> None:
     assert {3, 4} < {row[0] for row in rows}
 
 
-def test_rooms_are_those_of_the_jobs() -> None:
+def test_rooms_are_those_of_the_jobs():
     with pytest.raises(ValueError, match="rooms must be those of each job"):
         plan().plan(StepDraws(1, 2), 25_000, 110_000, RoomUse(), [])
     with pytest.raises(ValueError, match="chosen must be of each job"):
         plan().draw_order(StepDraws(1, 2), [True, True], 25_000, 110_000, False)
 
 
-def test_a_room_is_free_between_two_uses() -> None:
+def test_a_room_is_free_between_two_uses():
     """The slot lasts until the next use; of two rooms, the one that is free first."""
     use = RoomUse()
     use.add(7, 100, 200)

@@ -62,7 +62,7 @@ def venue_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) ->
     st.data(),
     st.sampled_from([("furnished", "ana"), ("empty", "ana"), ("furnished", "astro")]),
 )
-def test_activities_equal_those_done_leg_by_leg(data: st.DataObject, who: tuple[str, str]) -> None:
+def test_activities_equal_those_done_leg_by_leg(data, who):
     behavior, actor = person(*who)
     kinds = sorted({thing.type for thing in actor.home.objects if thing.uses})
     any_venue = venue_of(behavior.spots, list(behavior.reachable_rooms), kinds)
@@ -119,7 +119,7 @@ def live(home: Any = None, scene: CoreVenue | None = None, **changes: Any) -> An
     )
 
 
-def test_what_is_asked_for_is_used() -> None:
+def test_what_is_asked_for_is_used():
     end, posture, postures, notes = live()
     assert ((1000, 5, 5, 0, 0), 0, [], [(7, 0, 0)]) == (end, posture, postures, notes)
 
@@ -147,7 +147,7 @@ def walks_of(
     return spots
 
 
-def test_who_was_interrupted_returns_to_where_the_planned_activity_was_done() -> None:
+def test_who_was_interrupted_returns_to_where_the_planned_activity_was_done():
     scenes = [CoreVenue(None, 0, False, 0, 0, [room], [], [], [], None) for room in range(3)]
     planned, interrupts, resumes = 0, 1, 2
     rows = [(scenes[0], 0, 100, planned), (scenes[1], 1, 200, interrupts)]
@@ -159,7 +159,7 @@ EVERY_10_S = Waits(np.array([10 * SECOND_US] * 2))
 DUE_US = 7 + 10 * SECOND_US
 
 
-def test_no_move_begins_in_the_last_ninety_seconds() -> None:
+def test_no_move_begins_in_the_last_ninety_seconds():
     walks = {}
     for more_us in (0, 1):
         moves = CoreVenue(None, 0, False, 0, 0, [0, 1], [], [], [(1, EVERY_10_S)], None)
@@ -171,9 +171,7 @@ def test_no_move_begins_in_the_last_ninety_seconds() -> None:
 
 @pytest.mark.parametrize(("more_us", "walks"), [(0, 1), (1, 3)])
 @pytest.mark.parametrize("wait_us", [0, 20 * SECOND_US])
-def test_nothing_is_fetched_without_time_to_wait_and_return(
-    wait_us: int, more_us: int, walks: int
-) -> None:
+def test_nothing_is_fetched_without_time_to_wait_and_return(wait_us, more_us, walks):
     takes_5_s = ([5, 5], 5, 5, 0, 1 << 24)
     fetches = CoreVenue(None, 0, False, 0, 0, [0], [], [1], [(2, EVERY_10_S)], takes_5_s)
     end_us = DUE_US + wait_us + 5 * SECOND_US + 90 * SECOND_US + more_us
@@ -193,13 +191,13 @@ def test_nothing_is_fetched_without_time_to_wait_and_return(
         (9, ([-5, 8], -5, 8, 0, 1), "must take 0 s or more"),
     ],
 )
-def test_wrong_scenes_are_refused(place: int, value: Any, message: str) -> None:
+def test_wrong_scenes_are_refused(place, value, message):
     with pytest.raises(ValueError, match=message):
         CoreVenue(*VENUE[:place], value, *VENUE[place + 1 :])
 
 
 @pytest.mark.parametrize("waits", [[], [0], [0, 0], [1, 2, 3], [-1, 5], [2**61]])
-def test_wrong_waits_are_refused(waits: list[int]) -> None:
+def test_wrong_waits_are_refused(waits):
     with pytest.raises(ValueError, match="waits must be a power of two"):
         Waits(np.array(waits, np.int64))
 
@@ -218,12 +216,12 @@ def test_wrong_waits_are_refused(waits: list[int]) -> None:
         ({"walk": lambda *_: ((0, 0, 0, 0, 0), -1)}, "postures must be 0 to 127"),
     ],
 )
-def test_wrong_stints_and_answers_are_refused(changes: dict[str, Any], message: str) -> None:
+def test_wrong_stints_and_answers_are_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         live(**changes)
 
 
-def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known() -> None:
+def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known():
     last = LastStint()
     live(last=last)
     before = last.__getstate__()
@@ -239,7 +237,7 @@ def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known() -> N
     assert live(last=last)[0] == (1000, 5, 5, 0, 0)
 
 
-def test_wrong_rates_and_steps_are_refused() -> None:
+def test_wrong_rates_and_steps_are_refused():
     with pytest.raises(ValueError, match="speed and turn_rate"):
         Resident(1, 0.0, 1.0, None, [])
     with pytest.raises(ValueError, match="a pose must be within"):

@@ -60,14 +60,14 @@ def stretches(numbers: list[float]) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(bodies)
-def test_distances_between_bodies_equal_each_step(tracks: list[Track]) -> None:
+def test_distances_between_bodies_equal_each_step(tracks):
     window = timelines_of(tracks).window(0, STEPS)
     pairs = zip(poses_of(window, 0), poses_of(window, 1), strict=True)
     assert [slow.distance(*pair) for pair in pairs] == dense(distances_between(window, 0, 1))
 
 
 @given(bodies, st.lists(st.tuples(spot, spot, spot, spot), max_size=4))
-def test_distances_to_a_shape_equal_each_step(tracks: list[Track], boxes: list[slow.Edge]) -> None:
+def test_distances_to_a_shape_equal_each_step(tracks, boxes):
     edges = [
         edge
         for x0, y0, x1, y1 in boxes
@@ -83,9 +83,7 @@ portals = st.lists(st.tuples(spot, spot, spot, spot, st.integers(0, 9)), max_siz
 
 
 @given(bodies, st.integers(1, STEPS - 1), portals)
-def test_speeds_go_on_from_window_to_window(
-    tracks: list[Track], cut: int, links: list[slow.Portal]
-) -> None:
+def test_speeds_go_on_from_window_to_window(tracks, cut, links):
     timelines = timelines_of(tracks)
     poses = poses_of(timelines.window(0, STEPS), 0)
     x, y, away = poses[cut - 1]
@@ -98,25 +96,21 @@ def test_speeds_go_on_from_window_to_window(
 
 
 @given(values, st.integers(-6, 6), st.integers(0, 9), value, value)
-def test_the_greatest_value_of_a_window_equals_its_steps(
-    numbers: list[float], low: int, length: int, before: float, after: float
-) -> None:
+def test_the_greatest_value_of_a_window_equals_its_steps(numbers, low, length, before, after):
     expected = slow.sliding_max(numbers, low, low + length, before, after)
     result = sliding_max(*stretches(numbers), len(numbers), low, low + length, before, after)
     assert expected == dense(result, len(numbers))
 
 
 @given(st.lists(st.tuples(value, value), min_size=1, max_size=12), value)
-def test_until_is_the_best_of_all_steps_to_wait_for(
-    pairs: list[tuple[float, float]], after: float
-) -> None:
+def test_until_is_the_best_of_all_steps_to_wait_for(pairs, after):
     hold, goal = ([pair[i] for pair in pairs] for i in (0, 1))
     steps = np.arange(len(pairs))
     result = until(steps, np.array(hold), np.array(goal), after)
     assert slow.until(hold, goal, after) == dense(result, len(pairs))
 
 
-def test_wrong_stretches_are_refused() -> None:
+def test_wrong_stretches_are_refused():
     start, numbers = np.array([0, 2], np.int64), np.array([1.0, 2.0])
     with pytest.raises(ValueError, match="ascend"):
         sliding_max(start[::-1].copy(), numbers, 5, 0, 1, 0.0, 0.0)

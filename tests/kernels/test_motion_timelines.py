@@ -222,9 +222,7 @@ TestMoving.settings = quick
 
 @quick
 @given(st.data(), st.integers(0, 3), st.integers(0, 12), st.integers(0, 10**9))
-def test_a_window_of_given_poses_joins_equal_ones(
-    data: st.DataObject, bodies: int, steps: int, first: int
-) -> None:
+def test_a_window_of_given_poses_joins_equal_ones(data, bodies, steps, first):
     pose = st.tuples(*[st.integers(0, 1)] * 5)
     rows = st.lists(pose, min_size=steps, max_size=steps)
     poses = data.draw(st.lists(rows, min_size=bodies, max_size=bodies))
@@ -248,25 +246,25 @@ def resting(bodies: int = 1) -> Timelines:
     return timelines
 
 
-def test_resting_for_ten_years_is_one_run() -> None:
+def test_resting_for_ten_years_is_one_run():
     window = resting(3).window(0, 10 * 365 * 86_400_000)
     assert [0, 1, 2, 3] == window.start.tolist()
     assert [5, 5, 5] == window.x.tolist()
 
 
-def test_a_window_of_no_steps_has_no_runs() -> None:
+def test_a_window_of_no_steps_has_no_runs():
     window = resting(2).window(7, 7)
     assert [0, 0, 0] == window.start.tolist()
     assert [] == dense(window, 1, 7, 7)
 
 
-def test_a_window_of_nobody_has_no_runs() -> None:
+def test_a_window_of_nobody_has_no_runs():
     window = Timelines(0, STEP_US).window(3, 9)
     assert (3, 9, [0]) == (window.first, window.end, window.start.tolist())
 
 
 @pytest.mark.parametrize("name", ["start", "step", "x", "y", "heading", "away", "posture"])
-def test_arrays_of_a_window_are_read_only_and_outlive_it(name: str) -> None:
+def test_arrays_of_a_window_are_read_only_and_outlive_it(name):
     array = getattr(resting(500).window(3, 9), name)
     before = array.tolist()
     gc.collect()
@@ -275,7 +273,7 @@ def test_arrays_of_a_window_are_read_only_and_outlive_it(name: str) -> None:
         array[0] = 1
 
 
-def test_a_walk_is_drawn_once_and_the_same_in_any_order() -> None:
+def test_a_walk_is_drawn_once_and_the_same_in_any_order():
     rule_ = WalkRule(np.uint64(5), 9000, 40_000, 500)
     ways = []
     for order in ([50, 0, 20], [0, 20, 50]):
@@ -288,7 +286,7 @@ def test_a_walk_is_drawn_once_and_the_same_in_any_order() -> None:
     assert len(set(ways[0])) > 20
 
 
-def test_threads_may_ask_for_the_same_walk_at_once() -> None:
+def test_threads_may_ask_for_the_same_walk_at_once():
     """It is drawn on as it is asked for: two threads that did that at once crashed."""
     walker = WalkRule(np.uint64(5), 9000, 40_000, 500)
 
@@ -306,7 +304,7 @@ def test_threads_may_ask_for_the_same_walk_at_once() -> None:
             assert [expected] * 4 == list(pool.map(ask, [walking()] * 4))
 
 
-def test_timelines_keep_the_meshes_of_walks_alive() -> None:
+def test_timelines_keep_the_meshes_of_walks_alive():
     timelines = Timelines(1, STEP_US)
     mesh = home_of([shapely.box(0, 0, 1280, 960)]).mesh
     rule_ = WalkRule(np.uint64(5), 9000, 40_000, 500)
@@ -319,7 +317,7 @@ def test_timelines_keep_the_meshes_of_walks_alive() -> None:
     assert 200 == len(dense(again.window(0, 200), 0, 0, 200))
 
 
-def test_meshes_are_freed_with_their_walks() -> None:
+def test_meshes_are_freed_with_their_walks():
     """Doors that open and shut make many of them in a month."""
     timelines, rule_ = resting(2), WalkRule(np.uint64(5), 9000, 40_000, 500)
     meshes = [home_of([shapely.box(0, 0, 1280, 900 + 2 * i)]).mesh for i in range(4)]
@@ -342,7 +340,7 @@ def test_meshes_are_freed_with_their_walks() -> None:
     assert free == reference_counts()
 
 
-def test_copies_are_independent() -> None:
+def test_copies_are_independent():
     timelines = resting()
     twin = copy.deepcopy(timelines)
     track = breakpoints([(0, 50, 60, 70, 1)])
@@ -407,16 +405,14 @@ TRACK = breakpoints([(0, 5, 6, 7, 0), (10, 6, 6, 7, 0)])
         (lambda timelines: Timelines(1, 0), "1 or more"),
     ],
 )
-def test_invalid_calls_are_refused_and_change_nothing(
-    do: Callable[[Timelines], None], message: str
-) -> None:
+def test_invalid_calls_are_refused_and_change_nothing(do, message):
     timelines = resting()
     with pytest.raises(ValueError, match=message):
         do(timelines)
     assert (5, 6, 7, 0) == timelines.pose(0, 9)
 
 
-def test_a_body_without_a_motion_yet_is_nowhere() -> None:
+def test_a_body_without_a_motion_yet_is_nowhere():
     timelines = Timelines(2, STEP_US)
     for ask in (lambda: timelines.pose(1, 0), lambda: timelines.window(0, 3)):
         with pytest.raises(ValueError, match="no motion yet"):
@@ -424,7 +420,7 @@ def test_a_body_without_a_motion_yet_is_nowhere() -> None:
 
 
 @pytest.mark.parametrize("walks", [False, True])
-def test_forgotten_steps_are_refused(walks: bool) -> None:
+def test_forgotten_steps_are_refused(walks):
     timelines = resting()
     (walk() if walks else follow(step=4))(timelines)
     timelines.pose(0, 30)
@@ -440,7 +436,7 @@ def test_forgotten_steps_are_refused(walks: bool) -> None:
 
 @pytest.mark.parametrize("bodies", [0, 1, 3])
 @pytest.mark.parametrize("steps", [0, 1, 9])
-def test_a_pickled_window_is_restored(bodies: int, steps: int) -> None:
+def test_a_pickled_window_is_restored(bodies, steps):
     rng = np.random.default_rng(steps)
     columns = (rng.integers(0, 2, (bodies, steps)).astype(t) for t in POSE_TYPES)
     window = Window(7, *columns)
@@ -467,7 +463,7 @@ def test_a_pickled_window_is_restored(bodies: int, steps: int) -> None:
         ({"x": [0, 1, 2]}, "no state of a window"),
     ],
 )
-def test_states_that_no_window_has_are_refused(changes: dict[str, Any], message: str) -> None:
+def test_states_that_no_window_has_are_refused(changes, message):
     state = {
         "first": 7, "end": 11, "start": [0, 2, 4], "step": [7, 8, 7, 8],
         **{name: [0, 1, 2, 3] for name in ("x", "y", "heading", "away", "posture")},
@@ -487,7 +483,7 @@ def test_states_that_no_window_has_are_refused(changes: dict[str, Any], message:
         read({**state, **changes})
 
 
-def test_states_that_no_timelines_have_are_refused() -> None:
+def test_states_that_no_timelines_have_are_refused():
     timelines = resting()
     bodies, step_us, pieces = timelines.__getstate__()
     for wrong in (

@@ -3,14 +3,12 @@
 import math
 from fractions import Fraction
 from itertools import islice, pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from shapely.geometry import Polygon
 from tests.meshed_homes import Home, home_of, houseexpo
 from tests.reference import motion as slow
 from tests.reference.line_of_sight import is_inside, touches_any_wall
@@ -72,15 +70,13 @@ def tracks(draw: st.DrawFn) -> list[slow.Row]:
 
 @quick
 @given(tracks(), st.integers(-60, 400), st.sampled_from([1, 3, 20, 333_333]))
-def test_trace_track_equals_fractions(track: list[slow.Row], begin: int, step: int) -> None:
+def test_trace_track_equals_fractions(track, begin, step):
     assert twin(track, begin, step, 40) == traced(track, begin, step, 40)
 
 
 @quick
 @given(tracks(), st.integers(0, 200), st.integers(1, 40), st.integers(0, 30), st.integers(0, 30))
-def test_trace_track_of_two_spans_equals_one(
-    track: list[slow.Row], begin: int, step: int, first: int, second: int
-) -> None:
+def test_trace_track_of_two_spans_equals_one(track, begin, step, first, second):
     whole = traced(track, begin, step, first + second)
 
     split = traced(track, begin, step, first) + traced(track, begin + first * step, step, second)
@@ -131,14 +127,12 @@ def test_trace_track_of_two_spans_equals_one(
         ),
     ],
 )
-def test_trace_track_of_a_known_case(
-    track: list[slow.Row], begin: int, step: int, expected: list[slow.Pose]
-) -> None:
+def test_trace_track_of_a_known_case(track, begin, step, expected):
     assert expected == twin(track, begin, step, len(expected))
     assert expected == traced(track, begin, step, len(expected))
 
 
-def test_trace_track_of_a_ten_year_halt_and_a_day_long_leg_does_not_overflow() -> None:
+def test_trace_track_of_a_ten_year_halt_and_a_day_long_leg_does_not_overflow():
     years = 3650 * DAY_US
     track = [(0, 5, 5, 0, 0), (years, 5, 5, 0, 0), (years + DAY_US, 2**20, 5, 2047, 0)]
 
@@ -153,7 +147,7 @@ def test_trace_track_of_a_ten_year_halt_and_a_day_long_leg_does_not_overflow() -
     st.integers(1, 10**9),
     st.integers(1, 10**8),
 )
-def test_trace_track_rounds_halves_up(start: int, change: int, whole: int, step: int) -> None:
+def test_trace_track_rounds_halves_up(start, change, whole, step):
     """However many steps a leg has: quotients are carried along from step to step."""
     track = [(0, start, -start, 0, 0), (whole, start + change, -start - change, 1, 0)]
 
@@ -176,7 +170,7 @@ KNOWN = Breakpoints(*(np.array([0, 5, 9]) for _ in range(4)), np.zeros(3, np.uin
         pytest.param(KNOWN, 1 << 60, "step", id="beyond-all-time"),
     ],
 )
-def test_trace_track_refuses_invalid_input(track: Breakpoints, step: int, message: str) -> None:
+def test_trace_track_refuses_invalid_input(track, step, message):
     with pytest.raises(ValueError, match=message):
         trace_track(track, 0, step, poses(4))
 
@@ -199,9 +193,7 @@ corners = st.one_of(
     st.floats(100.0, 8000.0),
     st.integers(0, 4095),
 )
-def test_time_route_turns_then_walks_at_most_at_top_speed(
-    route: list[tuple[int, int]], speed: float, rate: float, heading: int
-) -> None:
+def test_time_route_turns_then_walks_at_most_at_top_speed(route, speed, rate, heading):
     """Each leg takes the least whole microseconds; a rounded float may add or take one."""
     rows = iter(timed(route, speed, rate, heading).tolist())
     state = [1_000_000, *route[0], heading]
@@ -225,7 +217,7 @@ def test_time_route_turns_then_walks_at_most_at_top_speed(
     assert next(rows, None) is None
 
 
-def test_time_route_of_a_known_route() -> None:
+def test_time_route_of_a_known_route():
     """Two points twice, a leg in the heading that it has already, a turn back."""
     route = [(0, 0), (0, 0), (1000, 0), (1000, 0), (3000, 0), (3000, 1500), (3000, 0)]
 
@@ -243,23 +235,23 @@ def test_time_route_of_a_known_route() -> None:
 
 
 @pytest.mark.parametrize("route", [[(5, 5)], [(5, 5), (5, 5)], [(5, 5)] * 4])
-def test_time_route_of_length_0_is_its_start(route: list[tuple[int, int]]) -> None:
+def test_time_route_of_length_0_is_its_start(route):
     assert [[1_000_000, 5, 5, 77]] == timed(route, 1000.0, 1024.0, heading=77).tolist()
 
 
-def test_time_route_rounds_every_time_up() -> None:
+def test_time_route_rounds_every_time_up():
     rows = timed([(0, 0), (0, 1)], 3.0, 3000.0)
 
     assert [1_000_000, 1_341_334, 1_674_668] == rows[:, 0].tolist()
 
 
 @pytest.mark.parametrize(("speed", "rate"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (math.nan, 1.0)])
-def test_time_route_refuses_speeds_that_lead_nowhere(speed: float, rate: float) -> None:
+def test_time_route_refuses_speeds_that_lead_nowhere(speed, rate):
     with pytest.raises(ValueError, match="above 0"):
         timed([(0, 0), (5, 5)], speed, rate)
 
 
-def test_endless_time_route_ends_at_the_last_possible_time() -> None:
+def test_endless_time_route_ends_at_the_last_possible_time():
     assert 2**61 == timed([(0, 0), (5, 5), (0, 9)], 1e-300, 1e-300)[-1, 0]
 
 
@@ -309,9 +301,7 @@ def check_walk(space: Home, steps: I64, rule: WalkRule) -> int:
 
 @quick
 @given(homes(), seeds(), st.sampled_from([700, 20_000, 90_000]), st.integers(0, 200))
-def test_trace_meander_equals_a_check_of_every_wall(
-    polygons: list[Polygon], seed: int, stride: int, limit: int
-) -> None:
+def test_trace_meander_equals_a_check_of_every_wall(polygons, seed, stride, limit):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     rule = WalkRule(np.uint64(seed), stride, 40_000, limit)
     for x, y in inner_points(home, rng, 2):
@@ -325,9 +315,7 @@ def test_trace_meander_equals_a_check_of_every_wall(
 
 @quick
 @given(homes(), seeds(), st.sampled_from([40, 100]))
-def test_trace_meander_from_the_border_of_the_space_equals_the_reference(
-    polygons: list[Polygon], seed: int, reach: int
-) -> None:
+def test_trace_meander_from_the_border_of_the_space_equals_the_reference(polygons, seed, reach):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     space = shrunk(home, reach)
     if space is None:
@@ -343,7 +331,7 @@ def test_trace_meander_from_the_border_of_the_space_equals_the_reference(
         assert np.array_equal(expected, walked(home, space, rule, 0, start, 25))
 
 
-def test_trace_meander_from_the_border_gets_inside_and_stays() -> None:
+def test_trace_meander_from_the_border_gets_inside_and_stays():
     home = home_of([shapely.box(0, 0, 2000, 2000)])
     space = home_of([shapely.box(300, 300, 1700, 1700)])
     rule = WalkRule(np.uint64(3), 20_000, 60_000, 1024)
@@ -358,7 +346,7 @@ def test_trace_meander_from_the_border_gets_inside_and_stays() -> None:
         assert check_walk(space, inside, rule) > 50
 
 
-def test_trace_meander_from_the_border_does_not_step_through_a_wall() -> None:
+def test_trace_meander_from_the_border_does_not_step_through_a_wall():
     """Beyond the wall is space too, one stride away, and it would be strictly inside."""
     home = home_of([shapely.box(0, 0, 2000, 1000), shapely.box(2010, 0, 4000, 1000)])
     space = home_of([shapely.box(300, 300, 1700, 700), shapely.box(2310, 300, 3700, 700)])
@@ -370,7 +358,7 @@ def test_trace_meander_from_the_border_does_not_step_through_a_wall() -> None:
 
 
 @pytest.mark.parametrize("stride", [256, 0.1 * 1280 * 256, 1280 * 256])
-def test_trace_meander_never_leaves_a_real_home(shared_data: Path, stride: float) -> None:
+def test_trace_meander_never_leaves_a_real_home(shared_data, stride):
     """Known failure 8: with 1 m a step, one move in five crossed a wall."""
     path = shared_data / "houseexpo" / "658e5214673c7a4e25b458e56bdb6144.json"
     home, rng = houseexpo(path), np.random.default_rng(8)
@@ -386,9 +374,7 @@ def test_trace_meander_never_leaves_a_real_home(shared_data: Path, stride: float
 
 @quick
 @given(homes(), seeds(), st.integers(1, 39))
-def test_trace_meander_of_two_spans_equals_one(
-    polygons: list[Polygon], seed: int, cut: int
-) -> None:
+def test_trace_meander_of_two_spans_equals_one(polygons, seed, cut):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     rule = WalkRule(np.uint64(seed), 15_000, 40_000, 500)
     for x, y in [*inner_points(home, rng, 1), home.walls[0, :2]]:
@@ -397,7 +383,7 @@ def test_trace_meander_of_two_spans_equals_one(
         assert np.array_equal(whole[cut:], walked(home, home, rule, 70 + cut, whole[cut], 40 - cut))
 
 
-def test_trace_meander_with_a_stride_beyond_the_home_stays_and_turns() -> None:
+def test_trace_meander_with_a_stride_beyond_the_home_stays_and_turns():
     home = home_of([shapely.box(0, 0, 640, 640)])
     rule = WalkRule(np.uint64(1), 1000 * 256, 60_000, 4096)
 
@@ -408,7 +394,7 @@ def test_trace_meander_with_a_stride_beyond_the_home_stays_and_turns() -> None:
 
 
 @pytest.mark.parametrize("limit", [0, 1, 37])
-def test_trace_meander_turns_no_faster_than_the_limit(limit: int) -> None:
+def test_trace_meander_turns_no_faster_than_the_limit(limit):
     home = home_of([shapely.box(0, 0, 6400, 6400)])
     rule = WalkRule(np.uint64(1), 2000, 20_000_000, limit)
 
@@ -421,7 +407,7 @@ def test_trace_meander_turns_no_faster_than_the_limit(limit: int) -> None:
 @pytest.mark.parametrize(
     "wrong", [{"stride": -1}, {"stride": 2**31}, {"sway": -1}, {"turn_limit": -1}]
 )
-def test_trace_meander_refuses_a_rule_that_is_none(wrong: dict[str, int]) -> None:
+def test_trace_meander_refuses_a_rule_that_is_none(wrong):
     home = home_of([shapely.box(0, 0, 640, 640)])
     rule = WalkRule(np.uint64(1), 5, 5, 5)._replace(**wrong)
 

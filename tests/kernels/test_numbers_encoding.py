@@ -51,7 +51,7 @@ def columns(draw: st.DrawFn) -> list[NDArray[Any]]:
 
 
 @given(columns())
-def test_bytes_are_those_of_the_twin_and_read_back(arrays: list[NDArray[Any]]) -> None:
+def test_bytes_are_those_of_the_twin_and_read_back(arrays):
     assert slow.encode_arrays(arrays) == encode_arrays(arrays)
     for values, back in zip(arrays, read_back(arrays), strict=True):
         assert is_same(values, back)
@@ -79,7 +79,7 @@ def test_bytes_are_those_of_the_twin_and_read_back(arrays: list[NDArray[Any]]) -
         (np.array([-(2**63), 2**63 - 1, 5] * 500), RAW),
     ],
 )
-def test_each_encoding_is_used_where_it_is_short(values: Any, encoding: int) -> None:
+def test_each_encoding_is_used_where_it_is_short(values, encoding):
     content = encode_arrays([values])
     assert encoding == content[0]
     assert slow.encode_arrays([values]) == content
@@ -100,7 +100,7 @@ def test_each_encoding_is_used_where_it_is_short(values: Any, encoding: int) -> 
         (np.r_[-(2**63), np.arange(998), 2**63 - 1], np.r_[np.zeros(999, np.int64), 1], False),
     ],
 )
-def test_times_that_are_multiples_of_steps_are_a_line(times: Any, steps: Any, fits: bool) -> None:
+def test_times_that_are_multiples_of_steps_are_a_line(times, steps, fits):
     content = encode_arrays([steps, times])
     alone = encode_arrays([steps])
     assert fits == (content[len(alone)] == LINE)
@@ -121,6 +121,6 @@ def test_times_that_are_multiples_of_steps_are_a_line(times: Any, steps: Any, fi
         None,
     ],
 )
-def test_what_no_column_holds_is_refused(wrong: Any) -> None:
+def test_what_no_column_holds_is_refused(wrong):
     with pytest.raises(TypeError, match="incompatible function arguments"):
         encode_arrays([np.zeros(3), wrong])

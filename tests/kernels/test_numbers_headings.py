@@ -29,14 +29,14 @@ from fleet2d.kernels import (
 LIBM_ERROR = 2.0**-22
 
 
-def test_sines_are_pinned() -> None:
+def test_sines_are_pinned():
     expected = "4c0e1da65ba03734026be97f8d3655689f8a33259be2b868f3f7511f9c5e3b28"
 
     assert (np.int64, (2 * QUARTER + 1,)) == (SINES.dtype, SINES.shape)
     assert expected == hashlib.sha256(SINES.astype("<i8").tobytes()).hexdigest()
 
 
-def test_sines_are_rounded_to_nearest_and_no_libm_can_disagree() -> None:
+def test_sines_are_rounded_to_nearest_and_no_libm_can_disagree():
     """No sine comes so near to the middle between two integers that an ulp would matter."""
     nearest_to_tie = 1.0
     for part in range(2 * QUARTER + 1):
@@ -50,7 +50,7 @@ def test_sines_are_rounded_to_nearest_and_no_libm_can_disagree() -> None:
 
 
 @pytest.mark.parametrize("shift", [0, 2 * TURN, -2 * TURN, 10 * TURN])
-def test_half_sine_goes_round_the_whole_turn(shift: int) -> None:
+def test_half_sine_goes_round_the_whole_turn(shift):
     for part in range(0, 2 * TURN, 1 if shift == 0 else 37):
         exact = slow.sine(part) * UNIT
 
@@ -58,14 +58,14 @@ def test_half_sine_goes_round_the_whole_turn(shift: int) -> None:
 
 
 @pytest.mark.parametrize("heading", [0, 1, 1023, 1024, 1025, 2048, 3071, 3072, 4095, -1, 5000])
-def test_sine_and_cosine_equal_the_heading(heading: int) -> None:
+def test_sine_and_cosine_equal_the_heading(heading):
     exact = slow.sine(2 * heading) * UNIT, slow.cosine(2 * heading) * UNIT
 
     assert abs(int(sine(heading)) - exact[0]) <= Decimal("0.5")
     assert abs(int(cosine(heading)) - exact[1]) <= Decimal("0.5")
 
 
-def test_sine_and_cosine_keep_the_symmetries_of_the_circle() -> None:
+def test_sine_and_cosine_keep_the_symmetries_of_the_circle():
     for heading in range(TURN):
         s, c = sine(heading), cosine(heading)
 
@@ -95,11 +95,11 @@ def test_sine_and_cosine_keep_the_symmetries_of_the_circle() -> None:
         (-(2**20), -1, 2048),
     ],
 )
-def test_heading_of_known_directions(dx: int, dy: int, expected: int) -> None:
+def test_heading_of_known_directions(dx, dy, expected):
     assert expected == heading_of(dx, dy)
 
 
-def test_heading_of_small_vectors_is_the_nearest() -> None:
+def test_heading_of_small_vectors_is_the_nearest():
     reach = 12
     for dx in range(-reach, reach + 1):
         for dy in range(-reach, reach + 1):
@@ -109,13 +109,13 @@ def test_heading_of_small_vectors_is_the_nearest() -> None:
 
 @quick
 @given(st.integers(-(2**20), 2**20), st.integers(-(2**20), 2**20))
-def test_heading_of_large_vectors_is_the_nearest(dx: int, dy: int) -> None:
+def test_heading_of_large_vectors_is_the_nearest(dx, dy):
     if dx == 0 and dy == 0:
         return
     assert {int(heading_of(dx, dy))} == slow.nearest_headings(dx, dy)
 
 
-def test_heading_of_vectors_near_a_boundary_is_the_nearest() -> None:
+def test_heading_of_vectors_near_a_boundary_is_the_nearest():
     """The hardest vectors: up to 700 units long, all but in the middle between two headings."""
     rng = np.random.default_rng(5)
     for part in 2 * rng.integers(0, TURN, 60) + 1:
@@ -130,7 +130,7 @@ def test_heading_of_vectors_near_a_boundary_is_the_nearest() -> None:
 
 @quick
 @given(st.integers(-(2**20), 2**20), st.integers(-(2**20), 2**20))
-def test_heading_of_turns_with_the_vector(dx: int, dy: int) -> None:
+def test_heading_of_turns_with_the_vector(dx, dy):
     if dx == 0 and dy == 0:
         return
     heading = heading_of(dx, dy)
@@ -139,7 +139,7 @@ def test_heading_of_turns_with_the_vector(dx: int, dy: int) -> None:
     assert (heading + HALF_TURN) % TURN == heading_of(-dx, -dy)
 
 
-def test_no_lattice_vector_lies_right_between_two_headings() -> None:
+def test_no_lattice_vector_lies_right_between_two_headings():
     """So no tie is ever broken: the smallest such vector would be longer than any plan."""
     for part in range(1, 2 * TURN, 2):
         c, s = int(half_sine(part + 2 * QUARTER)), int(half_sine(part))
@@ -164,19 +164,19 @@ def test_no_lattice_vector_lies_right_between_two_headings() -> None:
         (-1, 4097, 2),
     ],
 )
-def test_turn_between_is_the_shorter_way(start: int, end: int, expected: int) -> None:
+def test_turn_between_is_the_shorter_way(start, end, expected):
     assert expected == turn_between(start, end)
 
 
 @given(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
-def test_turn_between_leads_from_start_to_end(start: int, end: int) -> None:
+def test_turn_between_leads_from_start_to_end(start, end):
     turn = int(turn_between(start, end))
 
     assert -HALF_TURN <= turn < HALF_TURN
     assert (start + turn - end) % TURN == 0
 
 
-def test_vectors_whose_products_would_leave_64_bits_are_refused() -> None:
+def test_vectors_whose_products_would_leave_64_bits_are_refused():
     """That to (-2**63, -2**63) was turned for ever."""
     for dx, dy in ((-(2**63), -(2**63)), (2**31 + 1, 0), (0, -(2**31) - 1)):
         with pytest.raises(ValueError, match=r"within 2\*\*31"):
@@ -184,13 +184,13 @@ def test_vectors_whose_products_would_leave_64_bits_are_refused() -> None:
     assert [512, 3584] == [heading_of(2**31, 2**31), heading_of(2**31, -(2**31))]
 
 
-def test_the_table_of_a_whole_turn_has_the_sine_of_each_angle() -> None:
+def test_the_table_of_a_whole_turn_has_the_sine_of_each_angle():
     assert [int(half_sine(i)) for i in range(2 * TURN)] == half_sines().tolist()
 
 
 @quick
 @given(st.integers(-(2**31), 2**31), st.integers(-(2**31), 2**31), st.integers(-9000, 9000))
-def test_turned_points_are_the_nearest_to_the_exact_ones(x: int, y: int, angle: int) -> None:
+def test_turned_points_are_the_nearest_to_the_exact_ones(x, y, angle):
     columns = (np.array([value], np.int64) for value in (x, y, angle))
     new_x, new_y = (int(column[0]) for column in turned(*columns))
     along, up = int(half_sine(angle + 2 * QUARTER)), int(half_sine(angle))

@@ -1,6 +1,5 @@
 import copy
 import pickle
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -36,7 +35,7 @@ KNOWN = {
 
 
 @pytest.mark.parametrize("seed", KNOWN)
-def test_random_bits_are_the_published_outputs_of_splitmix64(seed: int) -> None:
+def test_random_bits_are_the_published_outputs_of_splitmix64(seed):
     expected = KNOWN[seed]
 
     assert expected == [int(random_bits(np.uint64(seed), i)) for i in range(len(expected))]
@@ -45,11 +44,11 @@ def test_random_bits_are_the_published_outputs_of_splitmix64(seed: int) -> None:
 
 @quick
 @given(keys, counters)
-def test_random_bits_of_any_key_and_counter_equal_the_reference(key: int, counter: int) -> None:
+def test_random_bits_of_any_key_and_counter_equal_the_reference(key, counter):
     assert slow.random_bits(key, counter) == int(random_bits(np.uint64(key), counter))
 
 
-def test_random_bits_are_addressed_not_drawn() -> None:
+def test_random_bits_are_addressed_not_drawn():
     key = np.uint64(2**64 - 1)
 
     forwards = [int(random_bits(key, i)) for i in range(50)]
@@ -60,21 +59,21 @@ def test_random_bits_are_addressed_not_drawn() -> None:
 
 @quick
 @given(keys, counters, st.one_of(st.sampled_from([1, 2, 2**31 - 1]), st.integers(1, 2**31 - 1)))
-def test_random_below_is_in_range_and_that_of_the_twin(key: int, counter: int, bound: int) -> None:
+def test_random_below_is_in_range_and_that_of_the_twin(key, counter, bound):
     drawn = int(random_below(np.uint64(key), counter, bound))
 
     assert 0 <= drawn < bound
     assert slow.random_below(key, counter, bound) == drawn
 
 
-def test_random_below_reaches_both_ends() -> None:
+def test_random_below_reaches_both_ends():
     key = np.uint64(7)
 
     assert set(range(6)) == {int(random_below(key, i, 6)) for i in range(200)}
     assert {0} == {int(random_below(key, i, 1)) for i in range(200)}
 
 
-def test_random_below_the_largest_bound_does_not_overflow() -> None:
+def test_random_below_the_largest_bound_does_not_overflow():
     """The product of 32 random bits and the bound needs 63 bits."""
     bound = 2**31 - 1
     of_ones, of_zeros = np.uint64(slow.key_of_word(2**64 - 1)), np.uint64(slow.key_of_word(0))
@@ -85,7 +84,7 @@ def test_random_below_the_largest_bound_does_not_overflow() -> None:
 
 @quick
 @given(keys, counters)
-def test_random_uniform_is_the_upper_53_bits(key: int, counter: int) -> None:
+def test_random_uniform_is_the_upper_53_bits(key, counter):
     drawn = float(random_uniform(np.uint64(key), counter))
 
     assert 0.0 <= drawn < 1.0
@@ -94,12 +93,12 @@ def test_random_uniform_is_the_upper_53_bits(key: int, counter: int) -> None:
 
 @quick
 @given(keys, counters)
-def test_random_bell_is_the_sum_of_the_bytes(key: int, counter: int) -> None:
+def test_random_bell_is_the_sum_of_the_bytes(key, counter):
     assert slow.random_bell(key, counter) == int(random_bell(np.uint64(key), counter))
 
 
 @pytest.mark.parametrize(("word", "expected"), [(0, -1020), (2**64 - 1, 1020), (255 << 56, -765)])
-def test_random_bell_of_extreme_words(word: int, expected: int) -> None:
+def test_random_bell_of_extreme_words(word, expected):
     """A word of ones has the largest sum: 2040, in lanes of sixteen bits."""
     key = np.uint64(slow.key_of_word(word))
     assert word == int(random_bits(key, 0))
@@ -107,7 +106,7 @@ def test_random_bell_of_extreme_words(word: int, expected: int) -> None:
     assert expected == int(random_bell(key, 0))
 
 
-def test_random_bell_has_the_stated_moments() -> None:
+def test_random_bell_has_the_stated_moments():
     chances = slow.distribution_of_bell()
     mean = sum(value * chance for value, chance in chances.items())
     variance = sum(value**2 * chance for value, chance in chances.items())
@@ -123,7 +122,7 @@ def test_random_bell_has_the_stated_moments() -> None:
     assert round(1020 / BELL_STD, 2) == 4.88
 
 
-def test_random_bell_draws_follow_their_distribution() -> None:
+def test_random_bell_draws_follow_their_distribution():
     """Ten thousand fixed draws: mean and standard deviation within three standard errors."""
     drawn = np.array([int(random_bell(np.uint64(11), i)) for i in range(10_000)])
 
@@ -133,7 +132,7 @@ def test_random_bell_draws_follow_their_distribution() -> None:
 
 @quick
 @given(keys, counters, st.lists(st.integers(1, 2**31 - 1)))
-def test_draws_of_a_step_equal_the_reference(key: int, step: int, bounds: list[int]) -> None:
+def test_draws_of_a_step_equal_the_reference(key, step, bounds):
     draws = StepDraws(np.uint64(key), step)
     own_key = slow.random_bits(key, step)
 
@@ -144,7 +143,7 @@ def test_draws_of_a_step_equal_the_reference(key: int, step: int, bounds: list[i
 
 @quick
 @given(keys, st.lists(st.integers(0, 30)))
-def test_bits_of_a_draw_of_30_are_used_from_the_lowest(key: int, counts: list[int]) -> None:
+def test_bits_of_a_draw_of_30_are_used_from_the_lowest(key, counts):
     bits, draws = Bits(StepDraws(np.uint64(key), 5)), StepDraws(np.uint64(key), 5)
 
     left = value = 0
@@ -155,7 +154,7 @@ def test_bits_of_a_draw_of_30_are_used_from_the_lowest(key: int, counts: list[in
         value, left = value >> count, left - count
 
 
-def test_bits_and_others_share_the_draws_of_a_step() -> None:
+def test_bits_and_others_share_the_draws_of_a_step():
     draws, all_of_them = StepDraws(np.uint64(3), 5), StepDraws(np.uint64(3), 5)
     bits = Bits(draws)
 
@@ -165,18 +164,18 @@ def test_bits_and_others_share_the_draws_of_a_step() -> None:
 
 
 @pytest.mark.parametrize("bound", [0, -1, 2**31, 2**62])
-def test_a_bound_out_of_range_is_refused(bound: int) -> None:
+def test_a_bound_out_of_range_is_refused(bound):
     with pytest.raises(ValueError, match=f"bound is {bound}: it must be from 1 to"):
         StepDraws(np.uint64(3), 5).below(bound)
 
 
-def test_more_than_30_bits_are_refused() -> None:
+def test_more_than_30_bits_are_refused():
     with pytest.raises(ValueError, match="count must be 0 to 30"):
         Bits(StepDraws(np.uint64(3), 5)).take(31)
 
 
 @pytest.mark.parametrize("way", [copy.copy, lambda draws: pickle.loads(pickle.dumps(draws))])
-def test_a_copy_of_draws_is_independent(way: Callable[[StepDraws], StepDraws]) -> None:
+def test_a_copy_of_draws_is_independent(way):
     draws = StepDraws(np.uint64(3), 5)
     draws.below(7)
     twin = way(draws)
@@ -185,6 +184,6 @@ def test_a_copy_of_draws_is_independent(way: Callable[[StepDraws], StepDraws]) -
 
 @quick
 @given(keys, st.lists(counters))
-def test_bell_shaped_draws_of_many_counters_are_those_of_each(key: int, many: list[int]) -> None:
+def test_bell_shaped_draws_of_many_counters_are_those_of_each(key, many):
     draws = random_bells(np.uint64(key), np.array(many, np.int64))
     assert [random_bell(key, counter) for counter in many] == draws.tolist()

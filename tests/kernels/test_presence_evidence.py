@@ -31,7 +31,7 @@ def views(seed: int, robots: int) -> tuple[I64, ...]:
 
 @pytest.mark.parametrize("robots", [0, 1, 3])
 @pytest.mark.parametrize("seed", range(4))
-def test_views_equal_numpy(seed: int, robots: int) -> None:
+def test_views_equal_numpy(seed, robots):
     cells, room, size, room_cells = views(seed, robots)
     first, of_patch = np.flatnonzero(np.diff(room, prepend=-1)), np.maximum(size, 1)
     summed, most = cells[:, :, 0], cells[:, :, 1].max(axis=1, initial=0)
@@ -51,7 +51,7 @@ def test_views_equal_numpy(seed: int, robots: int) -> None:
         assert np.array_equal(one, other)
 
 
-def test_half_a_part_is_rounded_to_the_even_one() -> None:
+def test_half_a_part_is_rounded_to_the_even_one():
     room, size = np.zeros(1, np.int64), np.array([510])
     cells = np.array([1, 3, 5, 509])[:, None, None, None].repeat(2, axis=2)
 
@@ -62,7 +62,7 @@ def test_half_a_part_is_rounded_to_the_even_one() -> None:
 
 @pytest.mark.parametrize("users", [1, 2, 4])
 @pytest.mark.parametrize("seed", range(4))
-def test_patches_with_an_unknown_person_are_not_watched(seed: int, users: int) -> None:
+def test_patches_with_an_unknown_person_are_not_watched(seed, users):
     random = np.random.default_rng(seed)
     shown = random.integers(0, 3, (12, 4)).astype(np.uint8)[random.integers(0, 12, 40)]
     user, bin_, patch = (random.integers(0, size, 60) for size in (users, 40, 4))
@@ -106,7 +106,7 @@ def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, I64]:
 
 @pytest.mark.parametrize("users", [0, 1, 2, 5])
 @pytest.mark.parametrize("longest", [1, 7, 9, 60, 700])
-def test_sums_by_hour_equal_numpy(users: int, longest: int) -> None:
+def test_sums_by_hour_equal_numpy(users, longest):
     random = np.random.default_rng(users)
     ends = np.cumsum(random.integers(1, longest + 1, 9))
     stretches = [chain_of(random, int(ends[-1])) for _ in range(max(users, 1))]
@@ -122,7 +122,7 @@ def test_sums_by_hour_equal_numpy(users: int, longest: int) -> None:
         assert (sums[:, -1] == b - a).all()
 
 
-def test_wrong_sizes_are_refused() -> None:
+def test_wrong_sizes_are_refused():
     chain, unknown = (np.full((2, 3), 1 / 3), np.array([3, 1])), np.zeros((4, 2), bool)
     chains = together([chain, chain])
     with pytest.raises(ValueError, match="no users"):

@@ -8,7 +8,7 @@ from fleet2d.kernels import earth_mover
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_earth_mover_equals_its_twin(seed: int) -> None:
+def test_earth_mover_equals_its_twin(seed):
     random = np.random.default_rng(seed)
     rows, places = random.integers(1, 30), random.integers(1, 14)
     start, end = random.dirichlet(np.full(places, random.uniform(0.2, 2)), (2, rows))
@@ -23,19 +23,19 @@ def test_earth_mover_equals_its_twin(seed: int) -> None:
 
 
 @pytest.mark.parametrize("places", [0, 1, 3])
-def test_nothing_is_moved_onto_itself(places: int) -> None:
+def test_nothing_is_moved_onto_itself(places):
     share = np.full((2, places), 0.25)
     assert [0.0, 0.0] == earth_mover(share, share, np.ones((places, places))).tolist()
     assert [] == earth_mover(share[:0], share[:0], np.ones((places, places))).tolist()
 
 
-def test_mass_that_has_no_place_to_go_stays() -> None:
+def test_mass_that_has_no_place_to_go_stays():
     assert [2.0] == earth_mover(
         np.array([[3.0, 0]]), np.array([[0, 1.0]]), 2 - 2 * np.eye(2)
     ).tolist()
 
 
-def test_wrong_arrays_are_refused() -> None:
+def test_wrong_arrays_are_refused():
     share, metres = np.full((2, 3), 1 / 3), np.zeros((3, 3))
     for arguments in ((share, share[:1], metres), (share, share, metres[:2])):
         with pytest.raises(ValueError, match="must be"):

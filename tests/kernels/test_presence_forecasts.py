@@ -7,7 +7,7 @@ from fleet2d._core import random_bits
 from fleet2d.kernels import advance, list_sightings, random_below, resampled
 
 
-def test_a_forecast_is_the_row_of_the_power() -> None:
+def test_a_forecast_is_the_row_of_the_power():
     transition = np.random.default_rng(2).dirichlet(np.ones(4), 4)
     for bins in (0, 1, 7, 300):
         expected = np.linalg.matrix_power(transition, bins)[2]
@@ -15,7 +15,7 @@ def test_a_forecast_is_the_row_of_the_power() -> None:
         assert np.abs(expected - forecast).max() < 1e-12
 
 
-def test_each_resample_draws_as_many_days_with_replacement() -> None:
+def test_each_resample_draws_as_many_days_with_replacement():
     days = np.array([[1.0, 10.0], [2.0, 20.0], [4.0, 40.0]])
     key = np.uint64(7)
     sums = resampled(key, days, 50)
@@ -27,7 +27,7 @@ def test_each_resample_draws_as_many_days_with_replacement() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_sightings_are_the_steps_with_each_user_in_each_room(seed: int) -> None:
+def test_sightings_are_the_steps_with_each_user_in_each_room(seed):
     random = np.random.default_rng(seed)
     users, rooms, bins, bin_steps = 2, 3, 4, 5
     step = np.sort(random.integers(-5, 25, 60))  # some before the first bin, some behind the last

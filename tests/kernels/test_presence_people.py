@@ -54,9 +54,7 @@ def states(random: np.random.Generator, people: int, stages: int) -> Any:
 
 
 @given(st.integers(0, 10_000), st.integers(1, 2), st.integers(1, 13))
-def test_people_side_by_side_are_the_products_of_their_own_matrices(
-    seed: int, stages: int, people: int
-) -> None:
+def test_people_side_by_side_are_the_products_of_their_own_matrices(seed, stages, people):
     model, day = models(seed, stages, people), evidence(seed, people)
     random = np.random.default_rng(seed)
     prior, future = states(random, people, stages), states(random, people, stages)
@@ -78,9 +76,7 @@ def test_people_side_by_side_are_the_products_of_their_own_matrices(
 
 
 @given(st.integers(0, 10_000), st.integers(1, 3), st.integers(1, 4), st.integers(1, 20))
-def test_learned_stays_are_those_of_whole_arrays(
-    seed: int, people: int, stages: int, rooms: int
-) -> None:
+def test_learned_stays_are_those_of_whole_arrays(seed, people, stages, rooms):
     random = np.random.default_rng(seed)
     places = rooms + 1
     patches = random.integers(1, 5, places)
@@ -99,7 +95,7 @@ def test_learned_stays_are_those_of_whole_arrays(
 
 
 @pytest.mark.parametrize("first", [[0, 2], [0, 1, 3], [1, 2, 4], [0, 3, 2, 4]])
-def test_learned_stays_refuse_other_places(first: list[int]) -> None:
+def test_learned_stays_refuse_other_places(first):
     counts = Moments(*(np.zeros(shape) for shape in ((1, 2), (1, 2, 3), (1, 4), (1, 2), (1, 2))))
     with pytest.raises(ValueError, match="first must ascend from 0"):
         learned_stays(counts, np.ones(1), np.ones(4), np.ones(2), np.array(first), 0.05)

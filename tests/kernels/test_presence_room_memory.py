@@ -37,13 +37,13 @@ def remembered(seen: list[slow.Sighting]) -> RoomMemory:
 @given(sightings)
 @example([(step, 0, 1) for step in range(3590, 3611)])  # over an hour, and the next ones again
 @example([(3599, 0, 1), (3600, 0, 1), (3600, 0, 1), (10, 0, 1)])
-def test_memory_of_sightings_equals_the_slow_twin(seen: list) -> None:
+def test_memory_of_sightings_equals_the_slow_twin(seen):
     expected = slow.memory_of(seen, PEOPLE, ROOMS, START_S)
     assert expected == tuple(part.tolist() for part in remembered(seen))
 
 
 @given(sightings, st.lists(st.integers(-1, 300_000), min_size=ROOMS, max_size=ROOMS))
-def test_observation_of_a_memory_equals_the_slow_twin(seen: list, visited: list) -> None:
+def test_observation_of_a_memory_equals_the_slow_twin(seen, visited):
     memory = remembered(seen)
     columns = ShownMemory(
         np.array([-1, 0, PEOPLE, PEOPLE + 1]),
@@ -61,6 +61,6 @@ def test_observation_of_a_memory_equals_the_slow_twin(seen: list, visited: list)
 
 
 @pytest.mark.parametrize(("identity", "room"), [(PEOPLE, 0), (-2, 0), (0, ROOMS)])
-def test_sighting_of_nobody_or_nowhere_is_refused(identity: int, room: int) -> None:
+def test_sighting_of_nobody_or_nowhere_is_refused(identity, room):
     with pytest.raises(ValueError, match="there is no such"):
         remembered([(0, identity, room)])

@@ -91,9 +91,7 @@ def twin(of: Case) -> Any:
 
 
 @given(st.integers(0, 10_000), st.integers(1, 3), st.integers(1, 7), st.integers(1, 4))
-def test_following_is_the_product_of_matrices(
-    seed: int, stages: int, count: int, longest: int
-) -> None:
+def test_following_is_the_product_of_matrices(seed, stages, count, longest):
     of = case(seed, stages, count, longest)
     steps, weights = twin(of)
     for step in steps:
@@ -107,7 +105,7 @@ def test_following_is_the_product_of_matrices(
 
 
 @given(st.integers(0, 10_000), st.integers(1, 2), st.integers(1, 6))
-def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int) -> None:
+def test_smoothing_is_the_product_of_matrices(seed, stages, count):
     of = case(seed, stages, count, longest=3)
     of.shown[:] = -1  # nothing is known of the view before
     prior = of.now.sum(axis=0)
@@ -126,7 +124,7 @@ def test_smoothing_is_the_product_of_matrices(seed: int, stages: int, count: int
         (2, "9063b3df558bf6a8782e68b8c3c324a261515bcc38635c5cce02e0669c35fb6b"),
     ],
 )
-def test_stays_are_the_same_to_the_last_bit_on_every_machine(stages: int, digest: str) -> None:
+def test_stays_are_the_same_to_the_last_bit_on_every_machine(stages, digest):
     """A sum over more than eight rooms once was added up in another order uncompiled."""
     of = portable(case(3, stages, 12, 3, sizes=(2, 1, 3, 1, 4, 2, 1, 5, 2, 3, 1, 2, 1)))
     prior, moments = of.now.sum(axis=0), no_moments(of.model)
@@ -150,7 +148,7 @@ def portable(of: Case) -> Case:
 
 
 @pytest.mark.parametrize("cut", [1, 3, 6])
-def test_evidence_in_pieces_is_followed_as_at_once(cut: int) -> None:
+def test_evidence_in_pieces_is_followed_as_at_once(cut):
     of = case(5, 2, 7, 1)
     whole_now, whole_shown = of.now.copy(), of.shown.copy()
     whole = follow(of.model, of.stretches, whole_now, whole_shown)
@@ -168,7 +166,7 @@ def test_evidence_in_pieces_is_followed_as_at_once(cut: int) -> None:
 
 
 @pytest.mark.parametrize("stages", [1, 2, 3])
-def test_without_evidence_stages_follow_each_other_by_their_steps(stages: int) -> None:
+def test_without_evidence_stages_follow_each_other_by_their_steps(stages):
     of = case(9, stages, 6, 1)
     blind = of.stretches._replace(
         views=np.zeros_like(of.stretches.views), begin=np.zeros(7, np.int64)

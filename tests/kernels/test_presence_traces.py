@@ -35,7 +35,7 @@ def evidence_of(
 
 @pytest.mark.parametrize("put_back", [0, 60, 120])
 @pytest.mark.parametrize("seed", range(12))
-def test_features_equal_those_of_the_twin(seed: int, put_back: int) -> None:
+def test_features_equal_those_of_the_twin(seed, put_back):
     random = np.random.default_rng(seed)
     count = [1, 2, 3, 7, 40][seed % 5]
     home = rooms_of(random, count)
@@ -54,7 +54,7 @@ def test_features_equal_those_of_the_twin(seed: int, put_back: int) -> None:
     assert np.abs(features - np.array(expected)).max() < 1e-8
 
 
-def test_features_are_the_same_in_parts() -> None:
+def test_features_are_the_same_in_parts():
     random = np.random.default_rng(5)
     home, evidence = rooms_of(random, 4), evidence_of(random, 90, 4, 0)
     memory, whole = np.zeros(trace_size(home)), np.zeros(trace_size(home))
@@ -68,7 +68,7 @@ def test_features_are_the_same_in_parts() -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_probabilities_equal_those_of_the_twin(seed: int) -> None:
+def test_probabilities_equal_those_of_the_twin(seed):
     random = np.random.default_rng(seed)
     width, hidden, count = 5, [1, 3, 8][seed % 3], [1, 2, 9][seed % 3]
     network = PlaceNetwork(
@@ -87,7 +87,7 @@ def test_probabilities_equal_those_of_the_twin(seed: int) -> None:
     assert np.abs(probability.sum(axis=1) - 1).max() < 1e-12
 
 
-def test_certainty_is_no_overflow() -> None:
+def test_certainty_is_no_overflow():
     network = PlaceNetwork(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1)), *np.zeros((2, 1)))
     features = np.array([[[0.0], [-5000.0], [800.0]]])
 

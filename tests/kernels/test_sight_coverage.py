@@ -1,6 +1,6 @@
 """What a robot has seen over time, against a twin that looks from every pose by brute force."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -172,9 +172,7 @@ TWO = [
 @pytest.mark.parametrize(("every", "slots"), [(1, 64), (1, 2), (3, 8)])
 @pytest.mark.parametrize("ends", [[], [1, 2, 17, 18, 40]], ids=["whole", "in spans"])
 @pytest.mark.parametrize("body", [None, 2], ids=["alone", "among others"])
-def test_sight_record_equals_brute_force(
-    cameras: Any, every: int, slots: int, ends: list[int], body: int | None
-) -> None:
+def test_sight_record_equals_brute_force(cameras, every, slots, ends, body):
     poses = random_poses(np.random.default_rng(len(cameras)), 60)
     lenses = lenses_of(*cameras)
 
@@ -189,7 +187,7 @@ def test_sight_record_equals_brute_force(
     assert (expected.first >= 0).sum() > 20
 
 
-def test_first_steps_may_be_left_out() -> None:
+def test_first_steps_may_be_left_out():
     """`explored` and `first_seen` are kept only if something reads them; the counts are the same."""
     shape, window = (FLAT.rows, FLAT.columns), window_of(random_poses(np.random.default_rng(1), 60))
     setup = CoverageSetup(FLAT.mesh, lenses_of(*ONE), rooms_of(FLAT), SECOND, 1, BIN)
@@ -209,9 +207,7 @@ def test_first_steps_may_be_left_out() -> None:
 
 @quick
 @given(seeds(), st.sampled_from([ONE, TWO]), st.integers(1, 4), st.lists(st.integers(1, 59)))
-def test_sight_record_in_spans_equals_brute_force(
-    seed: int, cameras: Any, every: int, cuts: list[int]
-) -> None:
+def test_sight_record_in_spans_equals_brute_force(seed, cameras, every, cuts):
     rng = np.random.default_rng(seed)
     poses, lenses = random_poses(rng, 60), lenses_of(*cameras)
     slots = int(rng.choice([2, 4, 64]))
@@ -223,7 +219,7 @@ def test_sight_record_in_spans_equals_brute_force(
         assert np.array_equal(one, other)
 
 
-def test_tables_that_do_not_fit_are_refused() -> None:
+def test_tables_that_do_not_fit_are_refused():
     shape, rooms = (FLAT.rows, FLAT.columns), rooms_of(FLAT)
     none = np.zeros((0, ROOMS), np.int64)
     record = CoverageRecord(

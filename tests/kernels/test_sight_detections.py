@@ -9,7 +9,6 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from shapely.geometry import Polygon
 from tests.meshed_homes import Home, home_of
 from tests.reference import detections as slow
 from tests.reference.random import key_of_word
@@ -463,14 +462,7 @@ def assert_same(
 
 @quick
 @given(homes(), eyes(), seeds(), st.integers(0, 3), st.integers(0, 10**9), stoppings)
-def test_look_equals_the_reference(
-    polygons: list[Polygon],
-    eye: slow.Eye,
-    seed: int,
-    count: int,
-    first: int,
-    stops: tuple[bool, bool],
-) -> None:
+def test_look_equals_the_reference(polygons, eye, seed, count, first, stops):
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), count)
 
@@ -479,13 +471,7 @@ def test_look_equals_the_reference(
 
 @quick
 @given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), st.integers(0, 3), stoppings)
-def test_look_of_several_cameras_equals_the_reference(
-    polygons: list[Polygon],
-    cameras: list[slow.Eye],
-    seed: int,
-    count: int,
-    stops: tuple[bool, bool],
-) -> None:
+def test_look_of_several_cameras_equals_the_reference(polygons, cameras, seed, count, stops):
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), count)
     assert_same(home, cameras, scene, 7, stops)
@@ -499,12 +485,8 @@ THICKNESSES = st.sampled_from([0, 1, 30, 100])
 @quick
 @given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings)
 def test_look_at_bodies_that_mostly_rest_equals_the_reference(
-    polygons: list[Polygon],
-    cameras: list[slow.Eye],
-    seed: int,
-    moves: float,
-    stops: tuple[bool, bool],
-) -> None:
+    polygons, cameras, seed, moves, stops
+):
     """Where neither moves, one verdict holds for many steps: until a camera pans."""
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), 2, LONG, moves)
@@ -522,13 +504,8 @@ def test_look_at_bodies_that_mostly_rest_equals_the_reference(
     st.sampled_from([1, 30, 100]),
 )
 def test_look_past_bodies_that_hide_each_other_equals_the_reference(
-    polygons: list[Polygon],
-    cameras: list[slow.Eye],
-    seed: int,
-    moves: float,
-    stops: tuple[bool, bool],
-    thickness: int,
-) -> None:
+    polygons, cameras, seed, moves, stops, thickness
+):
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
     scene = replace(scene, thickness=thickness)
@@ -537,7 +514,7 @@ def test_look_past_bodies_that_hide_each_other_equals_the_reference(
 
 
 @pytest.mark.parametrize("moves", [0.1, 1.0])
-def test_look_past_bodies_in_one_room_equals_the_reference(moves: float) -> None:
+def test_look_past_bodies_in_one_room_equals_the_reference(moves):
     """Where bodies hide each other often, and parts of each other."""
     eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
     scene = scene_in(ROOM, np.random.default_rng(8), 6, 120, moves)
@@ -551,12 +528,8 @@ def test_look_past_bodies_in_one_room_equals_the_reference(moves: float) -> None
 @quick
 @given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, THICKNESSES)
 def test_look_over_furniture_and_bodies_equals_the_reference(
-    polygons: list[Polygon],
-    cameras: list[slow.Eye],
-    seed: int,
-    moves: float,
-    thickness: int,
-) -> None:
+    polygons, cameras, seed, moves, thickness
+):
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
     scene = replace(scene, thickness=thickness, heights=seed + 1)
@@ -566,7 +539,7 @@ def test_look_over_furniture_and_bodies_equals_the_reference(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("thickness", [0, 60])
-def test_look_over_furniture_in_one_room_equals_the_reference(thickness: int) -> None:
+def test_look_over_furniture_in_one_room_equals_the_reference(thickness):
     """Where furniture hides people often, and parts of them."""
     eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
     scene = scene_in(ROOM, np.random.default_rng(8), 5, 60, 0.3)
@@ -590,7 +563,7 @@ def test_look_over_furniture_in_one_room_equals_the_reference(thickness: int) ->
           "boxes": np.zeros((1, 4), np.int64)}, "each piece must have corners"),
     ],
 )  # fmt: skip
-def test_heights_that_do_not_fit_are_refused(change: dict[str, I64], message: str) -> None:
+def test_heights_that_do_not_fit_are_refused(change, message):
     eye = slow.Eye(0, 900, 4096, SURE, 2, points=2)
     scene = replace(scene_in(ROOM, np.random.default_rng(3), 2, 5), heights=1, strangers=0)
     given_heights = scene.heights_for([eye])
@@ -607,13 +580,7 @@ def test_heights_that_do_not_fit_are_refused(change: dict[str, I64], message: st
 
 @quick
 @given(st.data(), st.lists(odd_eyes(), min_size=1, max_size=2), seeds(), MOVES, stoppings)
-def test_look_of_cameras_that_err_equals_the_reference(
-    data: st.DataObject,
-    cameras: list[slow.Eye],
-    seed: int,
-    moves: float,
-    stops: tuple[bool, bool],
-) -> None:
+def test_look_of_cameras_that_err_equals_the_reference(data, cameras, seed, moves, stops):
     rng = np.random.default_rng(seed)
     home, count = home_of(data.draw(homes())), int(rng.integers(0, 4))
     errs = data.draw(errors_of(cameras, count))
@@ -626,14 +593,7 @@ def test_look_of_cameras_that_err_equals_the_reference(
 @given(
     st.data(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings, THICKNESSES
 )
-def test_look_by_another_method_equals_the_reference(
-    data: st.DataObject,
-    cameras: list[slow.Eye],
-    seed: int,
-    moves: float,
-    stops: tuple[bool, bool],
-    thickness: int,
-) -> None:
+def test_look_by_another_method_equals_the_reference(data, cameras, seed, moves, stops, thickness):
     rng = np.random.default_rng(seed)
     home, errs = home_of(data.draw(homes())), data.draw(errors_of(cameras, 2))
     scene = scene_in(home, rng, 2, LONG, moves)
@@ -649,9 +609,7 @@ def test_look_by_another_method_equals_the_reference(
 
 @quick
 @given(st.data(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), st.integers(1, LONG - 1))
-def test_look_of_several_cameras_at_two_spans_is_that_at_one(
-    data: st.DataObject, cameras: list[slow.Eye], seed: int, cut: int
-) -> None:
+def test_look_of_several_cameras_at_two_spans_is_that_at_one(data, cameras, seed, cut):
     home, rng = home_of(data.draw(homes())), np.random.default_rng(seed)
     scene = scene_in(home, rng, 3, LONG, data.draw(st.sampled_from([1.0, 0.2])))
     errs, thickness = data.draw(errors_of(cameras, 3)), data.draw(THICKNESSES)
@@ -667,7 +625,7 @@ def test_look_of_several_cameras_at_two_spans_is_that_at_one(
     assert (whole.noticed, whole.seen) == (second.noticed, second.seen)
 
 
-def test_look_returns_any_number_of_sightings() -> None:
+def test_look_returns_any_number_of_sightings():
     scene = line_of([(50 + i, 0) for i in range(20)], steps=5000)
 
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 0)
@@ -680,7 +638,7 @@ def test_look_returns_any_number_of_sightings() -> None:
 
 @pytest.mark.parametrize("degrees", ANGLES)
 @pytest.mark.parametrize("detection", [0.0, 0.5, 1.0])
-def test_look_in_one_room_equals_the_reference(degrees: int, detection: float) -> None:
+def test_look_in_one_room_equals_the_reference(degrees, detection):
     home = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
     eye = slow.Eye(0, 700, half_angle(degrees), round(detection * 2**53), 2)
     scene = scene_in(home, np.random.default_rng(degrees), 4, 150)
@@ -691,9 +649,7 @@ def test_look_in_one_room_equals_the_reference(degrees: int, detection: float) -
 
 @pytest.mark.parametrize("per_track", [True, False])
 @pytest.mark.parametrize(("memory", "patience"), [("0 s", 2), ("4 s", 5)])
-def test_look_in_one_room_of_cameras_that_err_equals_the_reference(
-    per_track: bool, memory: str, patience: int
-) -> None:
+def test_look_in_one_room_of_cameras_that_err_equals_the_reference(per_track, memory, patience):
     """Where users are in view most of the time, so that every way to err happens often."""
     home = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
     cameras = [
@@ -724,9 +680,7 @@ def test_look_in_one_room_of_cameras_that_err_equals_the_reference(
 
 @quick
 @given(homes(), eyes(), seeds(), st.integers(1, STEPS - 1))
-def test_look_at_two_spans_is_that_at_one(
-    polygons: list[Polygon], eye: slow.Eye, seed: int, cut: int
-) -> None:
+def test_look_at_two_spans_is_that_at_one(polygons, eye, seed, cut):
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), 3)
     whole = looked(home, eye, scene, 50)
@@ -747,9 +701,7 @@ def test_look_at_two_spans_is_that_at_one(
 
 @quick
 @given(homes(), eyes(), seeds(), stoppings)
-def test_looks_with_stops_equal_looks_without(
-    polygons: list[Polygon], eye: slow.Eye, seed: int, stops: tuple[bool, bool]
-) -> None:
+def test_looks_with_stops_equal_looks_without(polygons, eye, seed, stops):
     home = home_of(polygons)
     scene = scene_in(home, np.random.default_rng(seed), 3)
     whole = looked(home, eye, scene, 0)
@@ -769,7 +721,7 @@ def test_looks_with_stops_equal_looks_without(
     assert (whole.noticed, whole.seen) == (memory.noticed.tolist(), memory.seen.tolist())
 
 
-def test_look_at_another_user_leaves_the_draws_of_the_first_alone() -> None:
+def test_look_at_another_user_leaves_the_draws_of_the_first_alone():
     """Known failure 9: adding a user changed the robot's random numbers."""
     home = home_of([shapely.box(0, 0, 1280, 960)])
     eye = slow.Eye(0, 700, half_angle(180), 2**52, 2)
@@ -804,9 +756,7 @@ SURE = 2**53
         (50, 100, 101, False),
     ],
 )
-def test_look_sees_between_its_ranges_ends_included(
-    near: int, far: int, distance: int, expected: bool
-) -> None:
+def test_look_sees_between_its_ranges_ends_included(near, far, distance, expected):
     seen = looked(ROOM, slow.Eye(near, far, 300, SURE, 1), line_of([(distance, 0)]), 0)
 
     assert expected == bool(seen.sightings)
@@ -845,9 +795,7 @@ def test_look_sees_between_its_ranges_ends_included(
         (1, 0, (0, 0), True),
     ],
 )
-def test_look_sees_within_its_angle_borders_included(
-    degrees: int, heading: int, offset: tuple[int, int], expected: bool
-) -> None:
+def test_look_sees_within_its_angle_borders_included(degrees, heading, offset, expected):
     eye = slow.Eye(0, 600, half_angle(degrees), SURE, 1)
     scene = line_of([offset], heading=heading)
 
@@ -856,7 +804,7 @@ def test_look_sees_within_its_angle_borders_included(
 
 
 @pytest.mark.parametrize("half", [1, 11, 1024, 2047, 2048, 2049, 3072, 4085, 4095, 4096])
-def test_in_wedge_of_every_direction_equals_cosines(half: int) -> None:
+def test_in_wedge_of_every_direction_equals_cosines(half):
     rng = np.random.default_rng(half)
     for heading in [0, 512, 2048, 4095, *rng.integers(0, 4096, 12).tolist()]:
         ahead, right, left = 2 * heading, 2 * heading - half, 2 * heading + half
@@ -870,7 +818,7 @@ def _sine(part: int) -> object:
     return slow.cosine(part - 2048)
 
 
-def test_look_of_the_narrowest_camera_does_not_see_behind() -> None:
+def test_look_of_the_narrowest_camera_does_not_see_behind():
     """Rounded to a half angle of 0, its wedge was a line through the robot."""
     lens = Camera(angle_deg=0.01).lens(1280, 1_000_000)
 
@@ -879,14 +827,14 @@ def test_look_of_the_narrowest_camera_does_not_see_behind() -> None:
 
 
 @pytest.mark.parametrize("half", [1, 300, 2047])
-def test_in_wedge_excludes_points_right_behind(half: int) -> None:
+def test_in_wedge_excludes_points_right_behind(half):
     for heading in range(0, 4096, 64):
         behind = [round(-1000 * float(f(2 * heading))) for f in (slow.cosine, _sine)]
 
         assert not in_wedge(heading, half, *behind)
 
 
-def test_look_counts_a_user_as_lost_after_its_patience() -> None:
+def test_look_counts_a_user_as_lost_after_its_patience():
     """Seen in steps 0 and 1, then away: lost in the first step that is `patience` after step 1."""
     scene = line_of([(50, 0)], steps=9)
     scene.users[0, 2:, 2] = 1
@@ -897,7 +845,7 @@ def test_look_counts_a_user_as_lost_after_its_patience() -> None:
     assert [(100, 0, USER_SEEN), (105, 0, USER_LOST)] == seen.events
 
 
-def test_look_does_not_lose_a_user_who_is_back_in_time() -> None:
+def test_look_does_not_lose_a_user_who_is_back_in_time():
     scene = line_of([(50, 0)], steps=9)
     scene.users[0, 2:5, 2] = 1
 
@@ -910,23 +858,21 @@ def test_look_does_not_lose_a_user_who_is_back_in_time() -> None:
     ("word", "chance", "expected"),
     [(0, 0, False), (0, 1, True), (2**64 - 1, SURE - 1, False), (2**64 - 1, SURE, True)],
 )
-def test_look_notices_never_at_chance_0_and_always_at_chance_1(
-    word: int, chance: int, expected: bool
-) -> None:
+def test_look_notices_never_at_chance_0_and_always_at_chance_1(word, chance, expected):
     """Even where the random bits are all zeros or all ones."""
     scene = replace(line_of([(50, 0)]), keys=np.array([key_of_word(word)], np.uint64))
 
     assert expected == bool(looked(ROOM, slow.Eye(0, 100, 300, chance, 1), scene, 0).sightings)
 
 
-def test_look_of_a_robot_that_is_away_sees_nobody() -> None:
+def test_look_of_a_robot_that_is_away_sees_nobody():
     scene = line_of([(50, 0), (0, 0)], steps=3)
     scene.robot[:, 3] = 1
 
     assert [] == looked(ROOM, slow.Eye(0, 100, 4096, SURE, 1), scene, 0).sightings
 
 
-def test_look_from_the_corner_of_the_lattice_is_from_outside() -> None:
+def test_look_from_the_corner_of_the_lattice_is_from_outside():
     """The first camera of a look at (0, 0) was taken to be located, in a triangle that there isn't."""
     home = home_of([shapely.box(64, 64, 1280, 1280)])
     scene = line_of([(50, 0)])
@@ -935,7 +881,7 @@ def test_look_from_the_corner_of_the_lattice_is_from_outside() -> None:
     assert [] == looked(home, slow.Eye(0, 5000, 4096, SURE, 1), scene, 0).sightings
 
 
-def test_look_in_the_step_of_a_stop_still_sees_the_other_users() -> None:
+def test_look_in_the_step_of_a_stop_still_sees_the_other_users():
     scene = line_of([(50, 0), (60, 0)], steps=5)
 
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 7, (False, True))
@@ -945,7 +891,7 @@ def test_look_in_the_step_of_a_stop_still_sees_the_other_users() -> None:
     assert len(seen.sightings) == 2
 
 
-def test_look_without_users_does_all_steps() -> None:
+def test_look_without_users_does_all_steps():
     empty = Scene(line_of([(0, 0)], 6).robot, np.empty((0, 6, 5), np.int64), np.empty(0, np.uint64))
 
     seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), empty, 0, (True, True))
@@ -966,9 +912,7 @@ def test_look_without_users_does_all_steps() -> None:
         ({"body": 2}, "no such body"),
     ],
 )
-def test_look_refuses_times_and_bodies_that_are_none(
-    change: Mapping[str, int], message: str
-) -> None:
+def test_look_refuses_times_and_bodies_that_are_none(change, message):
     """A step of no length divided by 0, a long pan never ended, others were read beyond the window."""
     scene, eye = line_of([(50, 0)]), slow.Eye(0, 100, 300, SURE, 4, pans=(5, 7), pan_us=STEP_US)
     lenses, errors, rule = kernel_args([eye], scene)

@@ -26,9 +26,7 @@ def lenses(**camera: object) -> Lenses:
 
 @quick
 @given(st.integers(0, 4095), st.floats(-1, 1), st.floats(-1, 1), st.floats(-180, 180))
-def test_a_camera_turns_with_its_body(
-    heading: int, forward: float, left: float, mount: float
-) -> None:
+def test_a_camera_turns_with_its_body(heading, forward, left, mount):
     stacked = lenses(offset=[forward, left], heading_deg=mount)
     x, y, towards = camera_pose(stacked, 0, 1000, 2000, heading, 0)
     angle = 2 * math.pi * heading / 4096
@@ -41,14 +39,14 @@ def test_a_camera_turns_with_its_body(
 @pytest.mark.parametrize(
     ("seconds", "degrees"), [(0, -45), (4.999, -45), (5, 0), (10, 45), (15, 0), (20, -45)]
 )
-def test_a_panning_camera_looks_along_its_current_heading(seconds: float, degrees: int) -> None:
+def test_a_panning_camera_looks_along_its_current_heading(seconds, degrees):
     stacked = lenses(pan={"headings_deg": [-45, 0, 45, 0], "dwell": "5 s"})
     _, _, towards = camera_pose(stacked, 0, 0, 0, 1024, round(seconds * 1e6))
     assert 1024 + degrees * 4096 // 360 == pytest.approx(towards, abs=1)
 
 
 @pytest.mark.parametrize("pan", [None, {"headings_deg": [-45, 0, 100], "dwell": "7 s"}])
-def test_poses_of_a_camera_at_many_moments_are_those_at_each(pan: dict[str, object] | None) -> None:
+def test_poses_of_a_camera_at_many_moments_are_those_at_each(pan):
     stacked = lenses(offset=[0.3, -0.2], heading_deg=77, pan=pan)
     moments = np.arange(200) * 333_333
     x, y, heading = 90_000 - 311 * moments // 10**6, 4 * np.arange(200), 37 * np.arange(200) % 4096
@@ -60,7 +58,7 @@ def test_poses_of_a_camera_at_many_moments_are_those_at_each(pan: dict[str, obje
 
 @quick
 @given(st.integers(0, 4095), st.integers(1, 4096), OFFSET, OFFSET)
-def test_points_in_a_wedge_are_within_its_angle(heading: int, half: int, dx: int, dy: int) -> None:
+def test_points_in_a_wedge_are_within_its_angle(heading, half, dx, dy):
     off = abs((math.atan2(dy, dx) * 4096 / math.pi - 2 * heading + 4096) % 8192 - 4096)
     if (dx, dy) != (0, 0) and abs(off - half) > 1e-2:
         assert (off < half) == in_wedge(heading, half, dx, dy)
@@ -68,9 +66,7 @@ def test_points_in_a_wedge_are_within_its_angle(heading: int, half: int, dx: int
 
 @quick
 @given(st.integers(0, 4095), st.integers(1, 4096), OFFSET, OFFSET, st.integers(0, 600))
-def test_no_body_that_reaches_into_a_wedge_is_left_out(
-    heading: int, half: int, dx: int, dy: int, reach: int
-) -> None:
+def test_no_body_that_reaches_into_a_wedge_is_left_out(heading, half, dx, dy, reach):
     """The quick test may be wrong one way only."""
     rim = [
         (round(reach * math.cos(a)), round(reach * math.sin(a))) for a in np.linspace(0, 6.2, 12)
@@ -79,7 +75,7 @@ def test_no_body_that_reaches_into_a_wedge_is_left_out(
         assert near_wedge(heading, half, dx, dy, reach + 1)
 
 
-def test_all_points_of_a_body_are_in_view_in_an_empty_hall() -> None:
+def test_all_points_of_a_body_are_in_view_in_an_empty_hall():
     stacked = lenses(range=[0, 5], body_points=8)
     shown = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
     assert 0b111111111 == shown
@@ -88,7 +84,7 @@ def test_all_points_of_a_body_are_in_view_in_an_empty_hall() -> None:
 
 
 @pytest.mark.parametrize(("far", "expected"), [(1.81, 1), (2.0, 6), (2.21, 9)])
-def test_points_beyond_the_range_are_not_in_view(far: float, expected: int) -> None:
+def test_points_beyond_the_range_are_not_in_view(far, expected):
     """A body of 20 cm at 2 m: its nearest point, then half of it, then all."""
     stacked = lenses(range=[0, far], body_points=8)
     shown = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
@@ -96,7 +92,7 @@ def test_points_beyond_the_range_are_not_in_view(far: float, expected: int) -> N
     assert (far > 2.2) == (shown == 0b111111111)
 
 
-def test_a_pillar_hides_a_body_behind_it() -> None:
+def test_a_pillar_hides_a_body_behind_it():
     walls, stacked = hall(PILLAR), lenses(range=[0, 9], angle_deg=360, body_points=8)
     x, y = (round(v * UNITS_PER_M) for v in (3.5, 1.2))
     assert 0 == points_in_view(walls, stacked, 0, 0, MIDDLE, MIDDLE, 0, x, y)
@@ -119,15 +115,13 @@ def test_a_pillar_hides_a_body_behind_it() -> None:
         ((101, 0), False),
     ],
 )
-def test_a_body_hides_a_point_whose_line_of_sight_it_touches(
-    centre: tuple[int, int], expected: bool
-) -> None:
+def test_a_body_hides_a_point_whose_line_of_sight_it_touches(centre, expected):
     """Of radius 10, before a point at (100, 0): one beside the eye or the point hides nothing."""
     assert expected == hides(100, 0, *centre, 10)
     assert expected == slow.hides((100, 0), centre, 10)
 
 
-def test_a_body_at_the_very_place_of_the_eye_is_hidden_by_nobody() -> None:
+def test_a_body_at_the_very_place_of_the_eye_is_hidden_by_nobody():
     assert not hides(0, 0, 3, 0, 10)
 
 
@@ -136,17 +130,13 @@ FAR = st.one_of(st.integers(-60, 60), st.integers(-(2**26), 2**26))
 
 @quick
 @given(FAR, FAR, FAR, FAR, st.one_of(st.integers(1, 60), st.integers(1, 2**17 - 1)))
-def test_points_hidden_by_a_body_equal_exact_fractions(
-    px: int, py: int, bx: int, by: int, radius: int
-) -> None:
+def test_points_hidden_by_a_body_equal_exact_fractions(px, py, bx, by, radius):
     assert slow.hides((px, py), (bx, by), radius) == hides(px, py, bx, by, radius)
 
 
 @quick
 @given(FAR, FAR, st.integers(1, 63), st.integers(1, 2**17 - 1), st.integers(-2, 2))
-def test_hiding_is_exact_at_the_rim_of_a_body(
-    px: int, py: int, part: int, radius: int, beside: int
-) -> None:
+def test_hiding_is_exact_at_the_rim_of_a_body(px, py, part, radius, beside):
     """Centres a radius away from the line, as nearly as the lattice has them."""
     length = math.hypot(px, py) or 1
     bx = round(px * part / 64 - py * radius / length) + beside

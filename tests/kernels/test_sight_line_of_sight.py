@@ -1,7 +1,5 @@
 """Lines of sight against a look at every wall, where rounding would go wrong."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -72,9 +70,7 @@ def check_against_every_wall(home: Home, mesh: Mesh, rng: np.random.Generator) -
 
 @quick
 @given(homes(), seeds())
-def test_line_of_sight_agrees_with_every_wall_and_is_symmetric(
-    polygons: list[Polygon], seed: int
-) -> None:
+def test_line_of_sight_agrees_with_every_wall_and_is_symmetric(polygons, seed):
     home = home_of(polygons)
 
     check_against_every_wall(home, home.mesh, np.random.default_rng(seed))
@@ -82,13 +78,13 @@ def test_line_of_sight_agrees_with_every_wall_and_is_symmetric(
 
 @quick
 @given(homes(), seeds())
-def test_line_of_sight_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) -> None:
+def test_line_of_sight_does_not_depend_on_the_mesh(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
 
     check_against_every_wall(home, shuffled(home.mesh, rng), rng)
 
 
-def test_line_of_sight_agrees_with_every_wall_of_real_homes(shared_data: Path) -> None:
+def test_line_of_sight_agrees_with_every_wall_of_real_homes(shared_data):
     rng = np.random.default_rng(1)
 
     for home in all_homes(shared_data):
@@ -96,9 +92,7 @@ def test_line_of_sight_agrees_with_every_wall_of_real_homes(shared_data: Path) -
 
 
 @pytest.mark.parametrize("name", ["658e5214673c7a4e25b458e56bdb6144"])
-def test_line_of_sight_is_the_same_in_the_turned_and_mirrored_home(
-    shared_data: Path, name: str
-) -> None:
+def test_line_of_sight_is_the_same_in_the_turned_and_mirrored_home(shared_data, name):
     home = houseexpo(shared_data / "houseexpo" / f"{name}.json")
     rng = np.random.default_rng(2)
     eyes = awkward_points(home, rng, 6)
@@ -113,7 +107,7 @@ def test_line_of_sight_is_the_same_in_the_turned_and_mirrored_home(
             assert np.array_equal(expected, _sees_each(turned.mesh, eye, moved))
 
 
-def test_the_two_twins_of_the_tests_agree() -> None:
+def test_the_two_twins_of_the_tests_agree():
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 200, 400, 300))])
     points = np.array([(x, y) for x in range(10, 640, 57) for y in range(10, 640, 57)])
     points = points[visible(home.walls, points[0], points) | (points[:, 0] < 200)]
@@ -173,9 +167,7 @@ CORRIDOR = home_of([shapely.box(128, 128, 3200, 192)])
         pytest.param(CORRIDOR, (130, 190), (3230, 130), False, id="beyond a corridor"),
     ],
 )
-def test_line_of_sight(
-    home: Home, eye: tuple[int, int], point: tuple[int, int], expected: bool
-) -> None:
+def test_line_of_sight(home, eye, point, expected):
     assert expected == sees(home, eye, point)
     assert expected == sees(home, point, eye)
     assert [expected] == visible(home.walls, np.array(eye), np.array([point])).tolist()
@@ -183,7 +175,7 @@ def test_line_of_sight(
 
 @pytest.mark.parametrize("length", [640, 6400, 64000, 640000])
 @pytest.mark.parametrize("thickness", [2, 8, 64])
-def test_nobody_right_behind_the_middle_of_a_long_wall_is_seen(length: int, thickness: int) -> None:
+def test_nobody_right_behind_the_middle_of_a_long_wall_is_seen(length, thickness):
     wall = shapely.box(256, 512, 256 + length, 512 + thickness)
     home = home_of([shapely.box(128, 128, length + 384, 1024).difference(wall)])
     middle = 256 + length // 2
@@ -197,9 +189,7 @@ def test_nobody_right_behind_the_middle_of_a_long_wall_is_seen(length: int, thic
 
 @quick
 @given(homes(), seeds(), st.integers(0, 700), st.integers(0, 40))
-def test_nearest_cells_in_sight_equal_the_slow_ones(
-    polygons: list[Polygon], seed: int, reach: int, most: int
-) -> None:
+def test_nearest_cells_in_sight_equal_the_slow_ones(polygons, seed, reach, most):
     home = home_of(polygons)
     rng = np.random.default_rng(seed)
     cells = rng.random((home.rows, home.columns)) < 0.8
@@ -212,9 +202,7 @@ def test_nearest_cells_in_sight_equal_the_slow_ones(
 
 @quick
 @given(homes(), seeds())
-def test_vertices_seen_from_a_point_are_those_no_wall_blocks(
-    polygons: list[Polygon], seed: int
-) -> None:
+def test_vertices_seen_from_a_point_are_those_no_wall_blocks(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     mesh = shuffled(home.mesh, rng)
     corners = {(x, y) for x, y in mesh.vertices.tolist()}
@@ -234,9 +222,7 @@ def test_vertices_seen_from_a_point_are_those_no_wall_blocks(
 
 @quick
 @given(homes(), seeds())
-def test_vertices_seen_from_a_vertex_are_those_no_wall_blocks(
-    polygons: list[Polygon], seed: int
-) -> None:
+def test_vertices_seen_from_a_vertex_are_those_no_wall_blocks(polygons, seed):
     home = home_of(polygons)
     mesh = shuffled(home.mesh, np.random.default_rng(seed))
 
@@ -248,7 +234,7 @@ def test_vertices_seen_from_a_vertex_are_those_no_wall_blocks(
         assert vertices_seen(home.walls, (x, y)) == set(visible)
 
 
-def test_fans_list_each_triangle_at_its_three_corners() -> None:
+def test_fans_list_each_triangle_at_its_three_corners():
     start, triangles = build_fans(HALL_WITH_PILLAR.mesh)
 
     for vertex in range(len(HALL_WITH_PILLAR.mesh.vertices)):

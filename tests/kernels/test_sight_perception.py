@@ -27,12 +27,12 @@ def table_of(**perception: object) -> I64:
 
 @quick
 @given(st.lists(st.integers(0, k.ONE), max_size=6).map(sorted), st.integers(0, k.ONE - 1))
-def test_pick_is_the_first_outcome_above_the_draw(sums: list[int], draw: int) -> None:
+def test_pick_is_the_first_outcome_above_the_draw(sums, draw):
     expected = next((i for i, end in enumerate(sums) if draw < end), len(sums))
     assert expected == _core.pick(np.array(sums, np.int64), draw)
 
 
-def test_random_shares_equal_single_draws_and_uniform() -> None:
+def test_random_shares_equal_single_draws_and_uniform():
     counters = np.arange(20_000)
     shares = k.random_shares(KEY, counters)
     assert [_core.random_share(KEY, i) for i in range(50)] == shares[:50].tolist()
@@ -46,7 +46,7 @@ MEMORY = table_of(detection={"memory": "30 s"})
 
 @quick
 @given(st.integers(0, 10_000))
-def test_lasting_is_the_exponential_of_the_steps(steps: int) -> None:
+def test_lasting_is_the_exponential_of_the_steps(steps):
     assert math.exp(-steps / 30) == pytest.approx(
         _core.persistence_chance(MEMORY, 0, steps) / k.ONE, abs=1e-7
     )
@@ -54,7 +54,7 @@ def test_lasting_is_the_exponential_of_the_steps(steps: int) -> None:
 
 @quick
 @given(VECTOR)
-def test_opposite_headings_differ_by_half_a_turn(vector: tuple[int, int]) -> None:
+def test_opposite_headings_differ_by_half_a_turn(vector):
     """So that one search for a heading tells both where a user is and where the camera is."""
     dx, dy = vector
     if (dx, dy) != (0, 0):
@@ -70,9 +70,7 @@ BY_ALL = table_of(detection=CURVES)
 
 @quick
 @given(VECTOR, st.integers(0, 4095), st.integers(0, 4095), st.integers(0, 2))
-def test_steady_chance_is_the_product_of_its_factors(
-    vector: tuple[int, int], heading: int, faces: int, posture: int
-) -> None:
+def test_steady_chance_is_the_product_of_its_factors(vector, heading, faces, posture):
     dx, dy = vector
     metres = math.hypot(dx, dy) / 1280
     towards = math.degrees(math.atan2(dy, dx))
@@ -89,7 +87,7 @@ def test_steady_chance_is_the_product_of_its_factors(
         assert expected == pytest.approx(chance / k.ONE, abs=3e-3)
 
 
-def test_notice_chance_is_the_product_in_its_unit_and_1_is_sure() -> None:
+def test_notice_chance_is_the_product_in_its_unit_and_1_is_sure():
     sure = _core.notice_chance(k.ONE, k.ONE, 2**53)
     assert 2**53 == sure
     assert 2**53 * 3 // 16 == _core.notice_chance(k.ONE * 3 // 4, k.ONE // 2, 2**52)
@@ -98,7 +96,7 @@ def test_notice_chance_is_the_product_in_its_unit_and_1_is_sure() -> None:
 
 @quick
 @given(VECTOR)
-def test_the_farthest_distances_share_the_last_bin(vector: tuple[int, int]) -> None:
+def test_the_farthest_distances_share_the_last_bin(vector):
     table = BY_ALL
     assert 0 <= _core.distance_bin(table, 0, *vector) < k.BINS
     assert k.BINS - 1 == _core.distance_bin(table, 0, 10**6, 10**6)
@@ -106,9 +104,7 @@ def test_the_farthest_distances_share_the_last_bin(vector: tuple[int, int]) -> N
 
 @quick
 @given(VECTOR, st.integers(-2000, 2000), st.integers(0, 9000))
-def test_turn_and_stretch_equals_trigonometry(
-    vector: tuple[int, int], turn: int, target_length: int
-) -> None:
+def test_turn_and_stretch_equals_trigonometry(vector, turn, target_length):
     dx, dy = vector
     distance = _core.length(dx, dy)
     if distance >= 100:
@@ -118,14 +114,14 @@ def test_turn_and_stretch_equals_trigonometry(
         assert (scale * math.cos(angle), scale * math.sin(angle)) == pytest.approx((x, y), abs=1.6)
 
 
-def test_a_user_at_the_camera_and_one_without_noise_stay_where_they_are() -> None:
+def test_a_user_at_the_camera_and_one_without_noise_stay_where_they_are():
     keys = np.zeros((1, 3, len(k.UserDraw)), np.uint64)
     noisy = table_of(attributes={"range_noise": 0.5, "bearing_noise_deg": 20})
     assert (0, 0) == _core.perceived_offset(noisy, keys, 0, 0, 7, 0, 0)
     assert (300, -40) == _core.perceived_offset(table_of(), keys, 0, 0, 7, 300, -40)
 
 
-def test_range_noise_never_puts_somebody_behind_the_camera() -> None:
+def test_range_noise_never_puts_somebody_behind_the_camera():
     keys = np.full((1, 3, len(k.UserDraw)), 5, np.uint64)
     table = table_of(attributes={"range_noise": 3})
     places = [_core.perceived_offset(table, keys, 0, 0, step, 400, 0) for step in range(2000)]
@@ -133,7 +129,7 @@ def test_range_noise_never_puts_somebody_behind_the_camera() -> None:
     assert {0} == {y for _, y in places}
 
 
-def test_the_perceived_posture_follows_from_the_draw() -> None:
+def test_the_perceived_posture_follows_from_the_draw():
     table = table_of(attributes={"posture": {"sit": {"stand": 0.25, "lie": 0.25}}})
     quarter = k.ONE // 4
     draws = (0, quarter - 1, quarter, 3 * quarter - 1, 3 * quarter, k.ONE - 1)
@@ -142,7 +138,7 @@ def test_the_perceived_posture_follows_from_the_draw() -> None:
 
 
 @pytest.mark.parametrize("far", [2**30 + 1, 2**31, 2**62, -(2**63)])
-def test_places_farther_away_than_any_home_is_wide_are_refused(far: int) -> None:
+def test_places_farther_away_than_any_home_is_wide_are_refused(far):
     """The square of their distance left 64 bits: it was in a bin before the first."""
     keys = np.zeros((1, 3, len(k.UserDraw)), np.uint64)
     for dx, dy in ((far, 0), (0, far), (far, far)):
@@ -158,6 +154,6 @@ def test_places_farther_away_than_any_home_is_wide_are_refused(far: int) -> None
 
 
 @pytest.mark.parametrize("distance", [0, -5, 2**40, 2**62])
-def test_lengths_that_nothing_can_be_stretched_from_are_refused(distance: int) -> None:
+def test_lengths_that_nothing_can_be_stretched_from_are_refused(distance):
     with pytest.raises(ValueError, match="distance must be"):
         _core.turn_and_stretch(300, 40, 5, distance, 400)

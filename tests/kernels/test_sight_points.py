@@ -1,7 +1,5 @@
 """Many points from one place: which are in sight, which in range and angle; and the best place."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -45,7 +43,7 @@ def in_reach(x: int, y: int, heading: int, reach: Reach, px: int, py: int) -> bo
 
 
 @pytest.mark.parametrize("half", HALVES)
-def test_points_in_reach_equal_plain_integers(half: int) -> None:
+def test_points_in_reach_equal_plain_integers(half):
     rng = np.random.default_rng(half)
     x, y = 1000, 700
     around = rng.integers(-300, 300, (60, 2))
@@ -60,7 +58,7 @@ def test_points_in_reach_equal_plain_integers(half: int) -> None:
 
 @quick
 @given(homes(), seeds())
-def test_points_in_sight_are_those_that_no_wall_hides(polygons: list[Polygon], seed: int) -> None:
+def test_points_in_sight_are_those_that_no_wall_hides(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     for eye in awkward_points(home, rng, 1):
         points = np.concatenate([awkward_points(home, rng, 4), behind_corners(home, eye, rng, 4)])
@@ -68,7 +66,7 @@ def test_points_in_sight_are_those_that_no_wall_hides(polygons: list[Polygon], s
         assert np.array_equal(expected, points_in_sight(home.mesh, *eye.tolist(), points))
 
 
-def test_points_in_sight_are_those_that_no_wall_hides_in_real_homes(shared_data: Path) -> None:
+def test_points_in_sight_are_those_that_no_wall_hides_in_real_homes(shared_data):
     rng, seen = np.random.default_rng(2), 0
     for home in all_homes(shared_data):
         for eye in awkward_points(home, rng, 3):
@@ -103,7 +101,7 @@ def best_by_counting(
 
 @quick
 @given(homes(), seeds())
-def test_best_view_is_the_first_of_those_that_show_most(polygons: list[Polygon], seed: int) -> None:
+def test_best_view_is_the_first_of_those_that_show_most(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     places, points = awkward_points(home, rng, 3), awkward_points(home, rng, 8)
     for far in (0.0, 300.0**2, 1e9):
@@ -112,7 +110,7 @@ def test_best_view_is_the_first_of_those_that_show_most(polygons: list[Polygon],
             assert expected == best_view(home.mesh, places, points, far, HALVES_OF_EIGHT, cosine)
 
 
-def test_best_view_is_the_place_past_the_wall_that_hides_points_from_the_others() -> None:
+def test_best_view_is_the_place_past_the_wall_that_hides_points_from_the_others():
     hook = Polygon([(0, 0), (900, 0), (900, 900), (600, 900), (600, 300), (0, 300)])
     mesh = home_of([hook]).mesh
     points = np.array([[750, y] for y in range(400, 900, 50)])
@@ -123,7 +121,7 @@ def test_best_view_is_the_place_past_the_wall_that_hides_points_from_the_others(
 
 
 @pytest.mark.parametrize("points", [np.array([[33, 33, 1]]), np.array([[33, 2**40]])])
-def test_points_that_are_none_are_refused(points: I64) -> None:
+def test_points_that_are_none_are_refused(points):
     home = home_of([Polygon([(0, 0), (640, 0), (640, 640), (0, 640)])])
 
     with pytest.raises(ValueError, match="points"):
@@ -139,7 +137,7 @@ def near(points: I64, line: I64, reach: float) -> list[bool]:
 
 @quick
 @given(seeds())
-def test_points_near_a_line_are_those_of_shapely(seed: int) -> None:
+def test_points_near_a_line_are_those_of_shapely(seed):
     rng = np.random.default_rng(seed)
     points = rng.integers(-200, 200, (300, 2))
     line = rng.integers(-200, 200, (int(rng.integers(2, 6)), 2))
@@ -160,9 +158,7 @@ def test_points_near_a_line_are_those_of_shapely(seed: int) -> None:
         ([], 9.0, [False] * 4),
     ],
 )
-def test_points_near_lines_at_the_edge(
-    line: list[list[int]], reach: float, expected: list[bool]
-) -> None:
+def test_points_near_lines_at_the_edge(line, reach, expected):
     points = np.array([[5, 3], [5, 4], [15, 0], [-1, 0]])
 
     result = points_near(points, np.array(line, np.int64).reshape(-1, 2), reach)
@@ -170,7 +166,7 @@ def test_points_near_lines_at_the_edge(
     assert expected == result.tolist()
 
 
-def test_points_at_the_very_distance_are_as_in_shapely() -> None:
+def test_points_at_the_very_distance_are_as_in_shapely():
     """3-4-5 triangles: the distance of points is exactly 5, which roundings may miss."""
     line = np.array([[-400, -300], [400, 300], [0, 600]])
     points = np.array([[x, y] for x in range(-60, 60) for y in range(-60, 60)])

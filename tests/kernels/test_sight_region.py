@@ -1,7 +1,6 @@
 """Visible regions: the verdicts of lines of sight, no gaps, exact areas, the same in every mesh."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -68,17 +67,13 @@ def check_verdicts(home: Home, mesh: Mesh, rng: np.random.Generator, eyes: int, 
 
 @quick
 @given(homes(), seeds())
-def test_region_contains_exactly_the_points_in_line_of_sight(
-    polygons: list[Polygon], seed: int
-) -> None:
+def test_region_contains_exactly_the_points_in_line_of_sight(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
 
     check_verdicts(home, shuffled(home.mesh, rng), rng, eyes=1, count=4)
 
 
-def test_region_contains_exactly_the_points_in_line_of_sight_in_real_homes(
-    shared_data: Path,
-) -> None:
+def test_region_contains_exactly_the_points_in_line_of_sight_in_real_homes(shared_data):
     rng = np.random.default_rng(3)
 
     for home in all_homes(shared_data):
@@ -87,7 +82,7 @@ def test_region_contains_exactly_the_points_in_line_of_sight_in_real_homes(
 
 @quick
 @given(homes(), seeds())
-def test_every_direction_belongs_to_one_piece(polygons: list[Polygon], seed: int) -> None:
+def test_every_direction_belongs_to_one_piece(polygons, seed):
     home = home_of(polygons)
     mesh = home.mesh
 
@@ -105,7 +100,7 @@ def test_every_direction_belongs_to_one_piece(polygons: list[Polygon], seed: int
 
 @quick
 @given(homes(), seeds())
-def test_region_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) -> None:
+def test_region_does_not_depend_on_the_mesh(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     other = shuffled(home.mesh, rng)
 
@@ -117,7 +112,7 @@ def test_region_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) 
 
 @quick
 @given(homes(), seeds())
-def test_area_is_exact(polygons: list[Polygon], seed: int) -> None:
+def test_area_is_exact(polygons, seed):
     home = home_of(polygons)
 
     for x, y in awkward_points(home, np.random.default_rng(seed), 1).tolist():
@@ -127,7 +122,7 @@ def test_area_is_exact(polygons: list[Polygon], seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_area_is_exact_and_equals_the_outline_in_a_real_home(shared_data: Path) -> None:
+def test_area_is_exact_and_equals_the_outline_in_a_real_home(shared_data):
     home = houseexpo(shared_data / "houseexpo" / "658e5214673c7a4e25b458e56bdb6144.json")
 
     for x, y in np.random.default_rng(4).choice(home.cells, 20).tolist():
@@ -136,7 +131,7 @@ def test_area_is_exact_and_equals_the_outline_in_a_real_home(shared_data: Path) 
         assert Polygon(outline).area == pytest.approx(area, rel=1e-12)
 
 
-def test_outline_ends_exactly_at_corners() -> None:
+def test_outline_ends_exactly_at_corners():
     area, outline = area_of(ROOM.mesh, 200, 200)
 
     corners = {tuple(corner) for corner in outline.tolist()}
@@ -144,7 +139,7 @@ def test_outline_ends_exactly_at_corners() -> None:
     assert area < Polygon([(128, 128), (1280, 128), (1280, 640), (128, 640)]).area
 
 
-def test_convex_room_is_seen_whole_from_everywhere() -> None:
+def test_convex_room_is_seen_whole_from_everywhere():
     mesh = home_of([shapely.box(0, 0, 640, 320)]).mesh
 
     for x, y in [(1, 1), (320, 160), (639, 319), (10, 300)]:
@@ -152,7 +147,7 @@ def test_convex_room_is_seen_whole_from_everywhere() -> None:
         assert len(visible_region(mesh, x, y)[0]) == 4
 
 
-def test_no_eye_in_a_wall_has_a_region() -> None:
+def test_no_eye_in_a_wall_has_a_region():
     for x, y in [(128, 200), (128, 128), (600, 350), (0, 0), (-5, 9), (600, 300)]:
         right, wall = visible_region(ROOM.mesh, x, y)
         assert len(right) == 0
@@ -175,11 +170,11 @@ def check_regions_of_cells(home: Home, step: int) -> float:
     return len(right) / len(cells)
 
 
-def test_regions_of_cells_equal_single_regions() -> None:
+def test_regions_of_cells_equal_single_regions():
     check_regions_of_cells(ROOM, step=11)
 
 
-def test_regions_of_cells_may_have_any_number_of_pieces() -> None:
+def test_regions_of_cells_may_have_any_number_of_pieces():
     raster = range(300, 1500, 200)
     pillars = [shapely.box(x, y, x + 8, y + 8) for x in raster for y in raster]
     hall = home_of([shapely.box(128, 128, 1600, 1600).difference(shapely.union_all(pillars))])
@@ -188,7 +183,7 @@ def test_regions_of_cells_may_have_any_number_of_pieces() -> None:
     assert check_regions_of_cells(hall, step=40) > 64
 
 
-def test_points_far_outside_the_home_are_in_no_region() -> None:
+def test_points_far_outside_the_home_are_in_no_region():
     right, wall = visible_region(ROOM.mesh, 200, 200)
     far = np.array([[200, 200], [2**62, 2**62], [-(2**63), 200], [200, 2**63 - 1]])
 
@@ -197,7 +192,7 @@ def test_points_far_outside_the_home_are_in_no_region() -> None:
     assert contained.tolist() == [True, False, False, False]
 
 
-def test_numbers_that_name_no_vertex_wall_or_cell_are_refused() -> None:
+def test_numbers_that_name_no_vertex_wall_or_cell_are_refused():
     mesh = ROOM.mesh
     right, wall = visible_region(mesh, 200, 200)
     points, triangles = np.array([[1, 1]]), rasterize_cells(mesh, ROOM.rows, ROOM.columns)

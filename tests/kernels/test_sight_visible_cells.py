@@ -1,12 +1,9 @@
 """The cells in view: those that every single line of sight says, in every home, at every angle."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
-from shapely.geometry import Polygon
 from tests.meshed_homes import (
     Home,
     all_homes,
@@ -69,7 +66,7 @@ def random_pose(home: Home, rng: np.random.Generator) -> tuple[int, int, int]:
 
 @quick
 @given(homes(), seeds())
-def test_cells_equal_brute_force(polygons: list[Polygon], seed: int) -> None:
+def test_cells_equal_brute_force(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     mesh = shuffled(home.mesh, rng, 2)
 
@@ -83,7 +80,7 @@ def test_cells_equal_brute_force(polygons: list[Polygon], seed: int) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 @pytest.mark.parametrize("at", [(33, 33), (0, 0), (40, 2), (33, 0), (0, 33)])
-def test_cells_round_a_pillar_equal_brute_force(half: int, at: tuple[int, int]) -> None:
+def test_cells_round_a_pillar_equal_brute_force(half, at):
     for heading in range(0, 4096, 256):
         pose = (320 + at[0], 192 + at[1], heading)
         shape = (ROOM.rows, ROOM.columns)
@@ -93,9 +90,7 @@ def test_cells_round_a_pillar_equal_brute_force(half: int, at: tuple[int, int]) 
         )
 
 
-def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(
-    shared_data: Path,
-) -> None:
+def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(shared_data):
     rng = np.random.default_rng(8)
     compared = 0
     for number, home in enumerate(all_homes(shared_data)):
@@ -112,7 +107,7 @@ def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(
     assert compared > 200_000 * (number + 1)
 
 
-def test_everything_in_view_all_round_is_free(shared_data: Path) -> None:
+def test_everything_in_view_all_round_is_free(shared_data):
     for home in list(all_homes(shared_data))[:10]:
         free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
         x, y = home.cells[len(home.cells) // 2].tolist()
@@ -121,12 +116,12 @@ def test_everything_in_view_all_round_is_free(shared_data: Path) -> None:
         assert not (in_view & ~free).any()
 
 
-def test_no_camera_in_a_wall_sees_a_cell() -> None:
+def test_no_camera_in_a_wall_sees_a_cell():
     for x, y in [(128, 200), (600, 350), (0, 0), (-5, 9), (5000, 20)]:
         assert not mask_in_view(ROOM, ROOM.mesh, (x, y, 0), Reach(0, 10**9, 4096)).any()
 
 
-def test_the_range_includes_its_ends_and_nothing_nearer() -> None:
+def test_the_range_includes_its_ends_and_nothing_nearer():
     eye = (64 * 6 + 33, 64 * 3 + 33, 0)
 
     in_view = mask_in_view(ROOM, ROOM.mesh, eye, Reach(64**2, (2 * 64) ** 2, 1))
@@ -134,7 +129,7 @@ def test_the_range_includes_its_ends_and_nothing_nearer() -> None:
     assert np.argwhere(in_view).tolist() == [[3, 7], [3, 8]]
 
 
-def test_numbers_without_a_meaning_are_refused() -> None:
+def test_numbers_without_a_meaning_are_refused():
     mesh, mask = ROOM.mesh, np.zeros((9, 9), np.bool_)
 
     for reach, message in [

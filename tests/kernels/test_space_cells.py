@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given
-from shapely.geometry import Polygon
 from tests.meshed_homes import home_of
 from tests.reference.routes import parts_of
 from tests.strategies import homes, quick
@@ -12,7 +11,7 @@ from fleet2d.kernels import label_triangles, rasterize_cells
 
 @quick
 @given(homes())
-def test_label_triangles_are_the_parts_of_the_twin(polygons: list[Polygon]) -> None:
+def test_label_triangles_are_the_parts_of_the_twin(polygons):
     mesh = home_of(polygons).mesh
 
     part = label_triangles(mesh.neighbors)
@@ -24,7 +23,7 @@ def test_label_triangles_are_the_parts_of_the_twin(polygons: list[Polygon]) -> N
 
 @quick
 @given(homes())
-def test_label_triangles_counts_the_polygons(polygons: list[Polygon]) -> None:
+def test_label_triangles_counts_the_polygons(polygons):
     """Polygons have disjoint insides: they touch in points at most, and a point joins nothing."""
     merged = shapely.get_parts(shapely.union_all(polygons))
 
@@ -40,13 +39,11 @@ def test_label_triangles_counts_the_polygons(polygons: list[Polygon]) -> None:
         ([[1, 2, 3], [0, -1, -1], [0, -1, -1], [0, -1, -1]], [0, 0, 0, 0]),
     ],
 )
-def test_label_triangles_numbers_parts_by_their_first_triangle(
-    neighbors: list[list[int]], expected: list[int]
-) -> None:
+def test_label_triangles_numbers_parts_by_their_first_triangle(neighbors, expected):
     assert expected == label_triangles(np.array(neighbors, np.int32)).tolist()
 
 
-def test_label_triangles_of_a_long_corridor_is_one_part() -> None:
+def test_label_triangles_of_a_long_corridor_is_one_part():
     """A walk through the mesh that called itself would run out of stack here."""
     count = 20_000
     chain = np.full((count, 3), -1, np.int32)
@@ -56,7 +53,7 @@ def test_label_triangles_of_a_long_corridor_is_one_part() -> None:
     assert not label_triangles(chain).any()
 
 
-def test_rasterized_cells_of_two_rooms_are_two_parts() -> None:
+def test_rasterized_cells_of_two_rooms_are_two_parts():
     home = home_of([shapely.box(64, 64, 640, 640), shapely.box(704, 64, 1280, 640)])
 
     triangles = rasterize_cells(home.mesh, home.rows, home.columns)

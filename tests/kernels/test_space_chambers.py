@@ -28,15 +28,13 @@ def labelled(draw: st.DrawFn) -> tuple[I32, Bool]:
 
 
 @given(labelled())
-def test_labels_spread_as_growing_them_step_by_step_does(
-    drawn: tuple[I32, Bool],
-) -> None:
+def test_labels_spread_as_growing_them_step_by_step_does(drawn):
     labels, mask = drawn
 
     assert np.array_equal(nearest_labels(labels, mask), spread_labels(labels, mask))
 
 
-def test_pairs_see_each_other_as_one_by_one() -> None:
+def test_pairs_see_each_other_as_one_by_one():
     mesh = build_mesh([shapely.box(0, 0, 640, 640) - shapely.box(256, 0, 320, 512)], 10, 10)
     rng = np.random.default_rng(3)
     eyes, places = rng.integers(-20, 660, (2, 300, 2))
@@ -50,9 +48,7 @@ def test_pairs_see_each_other_as_one_by_one() -> None:
 
 
 @given(labelled())
-def test_frames_are_the_boxes_of_the_cells_of_each_label(
-    drawn: tuple[I32, Bool],
-) -> None:
+def test_frames_are_the_boxes_of_the_cells_of_each_label(drawn):
     labels, _ = drawn
     frames = label_frames(labels, 4)
 
@@ -66,9 +62,7 @@ def test_frames_are_the_boxes_of_the_cells_of_each_label(
 
 
 @given(labelled())
-def test_cells_without_a_label_take_the_first_that_touches_them(
-    drawn: tuple[I32, Bool],
-) -> None:
+def test_cells_without_a_label_take_the_first_that_touches_them(drawn):
     labels = np.pad(drawn[0], 1, constant_values=-1).astype(np.int16)
     around = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
 

@@ -16,7 +16,7 @@ NOBODY = np.zeros((0, 3), np.int64)
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_way_round_discs_is_as_short_as_by_all_legs(seed: int) -> None:
+def test_a_way_round_discs_is_as_short_as_by_all_legs(seed):
     random = np.random.default_rng(seed)
     home = crowded(seed) if seed % 2 else home_of([shapely.box(0, 0, 4096, 4096)])
     region = region_of(home.mesh.vertices, home.mesh.triangles)
@@ -45,7 +45,7 @@ def test_a_way_round_discs_is_as_short_as_by_all_legs(seed: int) -> None:
     assert bent
 
 
-def test_nobody_in_the_way_leaves_the_shortest_way() -> None:
+def test_nobody_in_the_way_leaves_the_shortest_way():
     home = crowded(1)
     routes = routes_of(home)
     start, goal = some_points(home, np.random.default_rng(1), 2).tolist()
@@ -55,7 +55,7 @@ def test_nobody_in_the_way_leaves_the_shortest_way() -> None:
         assert np.array_equal(routes.around(*start, *goal, discs), shortest)
 
 
-def test_a_start_within_a_disc_is_left_away_from_its_middle() -> None:
+def test_a_start_within_a_disc_is_left_away_from_its_middle():
     routes = routes_of(home_of([shapely.box(0, 0, 4096, 4096)]))
     discs = np.array([[2000, 2000, 300]])
     assert routes.around(2200, 2000, 3500, 2000, discs) is not None
@@ -65,7 +65,7 @@ def test_a_start_within_a_disc_is_left_away_from_its_middle() -> None:
     assert routes.around(2000, 2000, 500, 2000, discs) is not None  # each way leads off the middle
 
 
-def test_there_is_no_way_to_a_goal_that_is_taken_or_walled_in_or_outside() -> None:
+def test_there_is_no_way_to_a_goal_that_is_taken_or_walled_in_or_outside():
     routes = routes_of(home_of([shapely.box(0, 0, 4096, 640)]))
     assert routes.around(100, 300, 3000, 300, np.array([[3000, 300, 1]])) is None
     assert routes.around(100, 300, 3000, 300, np.array([[2000, 320, 320]])) is None
@@ -81,14 +81,14 @@ def test_there_is_no_way_to_a_goal_that_is_taken_or_walled_in_or_outside() -> No
         (np.array([[1 << 40, 0, 1]]), r"2\*\*30"),
     ],
 )
-def test_discs_that_cannot_be_are_refused(discs: np.ndarray, message: str) -> None:
+def test_discs_that_cannot_be_are_refused(discs, message):
     routes = routes_of(home_of([shapely.box(0, 0, 640, 640)]))
     with pytest.raises(ValueError, match=message):
         routes.around(100, 100, 200, 200, discs)
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_a_place_beside_is_the_clear_cell_that_trying_all_of_them_finds(seed: int) -> None:
+def test_a_place_beside_is_the_clear_cell_that_trying_all_of_them_finds(seed):
     random = np.random.default_rng(seed)
     shape = tuple(random.integers(1, 24, 2))
     parts = random.integers(-1, 2, shape, np.int32)
@@ -104,7 +104,7 @@ def test_a_place_beside_is_the_clear_cell_that_trying_all_of_them_finds(seed: in
     assert place_beside(*floor, place, start, slack, discs) == slow.place_beside(floor, place, start, slack, discs)  # fmt: skip
 
 
-def test_a_place_outside_of_the_cells_is_refused() -> None:
+def test_a_place_outside_of_the_cells_is_refused():
     cells = np.zeros((4, 4), np.int32), 0, np.zeros((4, 4), np.int16), -1
     with pytest.raises(ValueError, match="place must be in a cell"):
         place_beside(*cells, (4 * SUB, 0), (0, 0), 0, NOBODY)

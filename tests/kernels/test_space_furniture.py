@@ -29,7 +29,7 @@ def floor_of(shape: tuple[int, int], share: float, seed: int) -> tuple[RoomFloor
 
 @pytest.mark.parametrize("shape", [(0, 0), (0, 3), (3, 0), *SHAPES])
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
-def test_corner_sums_equal_the_slow_ones(shape: tuple[int, int], share: float) -> None:
+def test_corner_sums_equal_the_slow_ones(shape, share):
     mask = np.random.default_rng(1).random(shape) < share
 
     assert slow.corner_sums(mask).tolist() == corner_sums(mask).tolist()
@@ -51,16 +51,14 @@ def test_corner_sums_equal_the_slow_ones(shape: tuple[int, int], share: float) -
         far=st.integers(1, 6),
     ),
 )
-def test_places_equal_the_slow_ones(
-    shape: tuple[int, int], share: float, seed: int, group: GroupRule
-) -> None:
+def test_places_equal_the_slow_ones(shape, share, seed, group):
     floor, occupied = floor_of(shape, share, seed)
 
     expected = slow.group_places(floor, occupied, group)
     assert expected.tolist() == group_places(floor, occupied, group).tolist()
 
 
-def test_group_larger_than_the_room_has_no_place() -> None:
+def test_group_larger_than_the_room_has_no_place():
     floor, occupied = floor_of((4, 6), 1.0, 0)
     nothing = np.zeros_like(occupied)
 
@@ -71,7 +69,7 @@ def test_group_larger_than_the_room_has_no_place() -> None:
     assert 0 == len(group_places(floor, ~nothing, SMALL))
 
 
-def test_arrays_of_another_shape_are_refused() -> None:
+def test_arrays_of_another_shape_are_refused():
     floor, occupied = floor_of((4, 6), 1.0, 0)
 
     with pytest.raises(ValueError, match="must have one shape"):

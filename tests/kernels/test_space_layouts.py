@@ -69,7 +69,7 @@ seeds = st.integers(0, 2**20)
 
 @quick
 @given(seeds, st.integers(60, 300), st.integers(40, 200), st.booleans())
-def test_squarest_rooms_equal_the_slow_ones(seed: int, width: int, height: int, ends: bool) -> None:
+def test_squarest_rooms_equal_the_slow_ones(seed, width, height, ends):
     trees, areas = trees_of(seed), areas_of(seed)
     sides = np.array([-5, 3, width - 5, height + 3])
     mouths = np.array([(-5, 20, -5, 44), (30, 3, 52, 3)] if ends else []).reshape(-1, 4)
@@ -81,9 +81,7 @@ def test_squarest_rooms_equal_the_slow_ones(seed: int, width: int, height: int, 
 
 @quick
 @given(seeds, st.integers(35, 500), st.booleans(), corridors)
-def test_strips_and_rows_equal_the_slow_ones(
-    seed: int, length: int, bays: bool, corridor: CorridorRule
-) -> None:
+def test_strips_and_rows_equal_the_slow_ones(seed, length, bays, corridor):
     slots, areas = slots_of(seed, bays), areas_of(seed)
 
     asked = (length, 20, 240)
@@ -95,9 +93,7 @@ def test_strips_and_rows_equal_the_slow_ones(
 
 @quick
 @given(seeds, seeds, st.booleans(), corridors)
-def test_wings_equal_the_slow_ones(
-    front_seed: int, back_seed: int, bays: bool, corridor: CorridorRule
-) -> None:
+def test_wings_equal_the_slow_ones(front_seed, back_seed, bays, corridor):
     areas = areas_of(front_seed)
     strips = slots_of(front_seed, bays), slots_of(back_seed, bays)
     depths = np.array([56, 70, 84, 110])
@@ -111,7 +107,7 @@ def test_wings_equal_the_slow_ones(
     assert slow.squarest_depth(*strips, *asked) == squarest_depth(*strips, *asked)
 
 
-def test_wings_of_every_kind_occur() -> None:
+def test_wings_of_every_kind_occur():
     made = []
     for seed in range(200):
         corridor = CorridorRule(11, 24, bool(seed % 2), -1 if seed % 3 else 10)
@@ -122,7 +118,7 @@ def test_wings_of_every_kind_occur() -> None:
     assert 0 < sum(map(bool, made)) < len(made)
 
 
-def test_wrong_trees_and_slots_are_refused() -> None:
+def test_wrong_trees_and_slots_are_refused():
     areas = areas_of(0)
     sides, mouths = np.array([0, 0, 90, 90]), np.zeros((0, 4), np.int64)
     starts = np.zeros(1, np.int64)
@@ -152,7 +148,7 @@ TWO = np.array([(0, -1, 0), (1, -1, 0)])
 OTHERS = np.array([(2, -1, 0), (3, -1, 0)])
 
 
-def test_closets_are_as_long_as_their_bounds() -> None:
+def test_closets_are_as_long_as_their_bounds():
     areas = areas_of(0)
     corridor = CorridorRule(11, 24, False, 10)
     lengths = set()
@@ -166,7 +162,7 @@ def test_closets_are_as_long_as_their_bounds() -> None:
 
 
 @pytest.mark.parametrize("closet", [-1, 10])
-def test_a_corridor_is_left_out_where_it_would_be_too_short(closet: int) -> None:
+def test_a_corridor_is_left_out_where_it_would_be_too_short(closet):
     areas = np.full(ROOMS, 2400.0)
     areas[10] = 720.0
     corridor = CorridorRule(11, 24, False, closet)
@@ -179,7 +175,7 @@ def test_a_corridor_is_left_out_where_it_would_be_too_short(closet: int) -> None
     assert min(ends) == 24
 
 
-def test_the_last_room_of_the_front_reaches_the_corridor_at_every_place() -> None:
+def test_the_last_room_of_the_front_reaches_the_corridor_at_every_place():
     areas = np.full(ROOMS, 6000.0)
     areas[3] = 3000.0
     corridor = CorridorRule(11, 24, True, -1)
@@ -197,7 +193,7 @@ def test_the_last_room_of_the_front_reaches_the_corridor_at_every_place() -> Non
     assert {-26, -25} <= beyond  # nearer than that, the suite is given up
 
 
-def test_of_equals_the_first_counts() -> None:
+def test_of_equals_the_first_counts():
     areas = np.full(ROOMS, 4000.0)
     nodes = np.array([(-2, 2), (0, 100), (1, 100), (-2, 2), (1, 100), (0, 100)])
     trees = Divisions(nodes, np.array([0, 3]))
@@ -218,7 +214,7 @@ def test_of_equals_the_first_counts() -> None:
     assert slow.squarest_depth(*asked) == squarest_depth(*asked) == 0
 
 
-def test_rooms_at_their_limits_are_promising() -> None:
+def test_rooms_at_their_limits_are_promising():
     for width, is_so in ((73, True), (74, True), (75, False)):
         boxes = np.array([(0, 0, 0, width, 26)])
         assert slow.is_promising(boxes, LIMITS) == is_promising(boxes, LIMITS) == is_so
@@ -228,7 +224,7 @@ def test_rooms_at_their_limits_are_promising() -> None:
 
 
 @pytest.mark.parametrize("height", [1, 4, 12, 16, 20])
-def test_rooms_without_a_height_are_as_slender_as_said(height: int) -> None:
+def test_rooms_without_a_height_are_as_slender_as_said(height):
     """Eight rooms above one another, lower than their walls, or side by side."""
     areas = np.full(ROOMS, 4000.0)
     rooms = [(room, 100) for room in range(8)]
@@ -240,7 +236,7 @@ def test_rooms_without_a_height_are_as_slender_as_said(height: int) -> None:
 
 
 @pytest.mark.parametrize(("bay", "least"), [(0, 20), (-10, 31), (10, 21)])
-def test_strips_are_as_deep_as_their_bounds(bay: int, least: int) -> None:
+def test_strips_are_as_deep_as_their_bounds(bay, least):
     slots = np.array([(0, -1, bay), (1, -1, 0)])
     areas = np.full(ROOMS, 4000.0)
     depths = set()

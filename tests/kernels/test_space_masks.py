@@ -87,16 +87,14 @@ def slow_sides(mask: Bool) -> set[tuple[int, ...]]:
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("diagonal", [False, True])
-def test_parts_of_random_masks_equal_the_reference(
-    shape: tuple[int, int], share: float, diagonal: bool
-) -> None:
+def test_parts_of_random_masks_equal_the_reference(shape, share, diagonal):
     for mask in masks(shape, share, 4):
         assert np.array_equal(slow_label_parts(mask, diagonal), label_parts(mask, diagonal))
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("share", SHARES)
-def test_steps_in_random_masks_equal_the_reference(shape: tuple[int, int], share: float) -> None:
+def test_steps_in_random_masks_equal_the_reference(shape, share):
     for mask, start in zip(masks(shape, share), masks(shape, 0.1), strict=True):
         assert np.array_equal(slow_count_steps(start, mask), count_steps(start, mask))
 
@@ -106,9 +104,7 @@ def test_steps_in_random_masks_equal_the_reference(shape: tuple[int, int], share
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("share", SHARES)
-def test_rings_of_random_masks_run_along_every_side_once_with_the_mask_on_the_left(
-    shape: tuple[int, int], share: float
-) -> None:
+def test_rings_of_random_masks_run_along_every_side_once_with_the_mask_on_the_left(shape, share):
     for mask in masks(shape, share):
         sides = unit_sides(rings_of(mask))
 
@@ -117,7 +113,7 @@ def test_rings_of_random_masks_run_along_every_side_once_with_the_mask_on_the_le
 
 
 @pytest.mark.parametrize("share", [0.5, 0.6, 0.7, 0.9])
-def test_rings_of_one_part_are_one_sound_polygon_that_covers_its_pixels(share: float) -> None:
+def test_rings_of_one_part_are_one_sound_polygon_that_covers_its_pixels(share):
     for mask in masks((14, 11), share, 40):
         part = label_parts(mask, False)
         largest = part == np.argmax(np.bincount(part[mask]))
@@ -133,13 +129,13 @@ def test_rings_of_one_part_are_one_sound_polygon_that_covers_its_pixels(share: f
         assert shape.equals(shapely.union_all(shapely.box(x, y, x + 1, y + 1)))
 
 
-def test_rings_bend_at_every_corner_and_nowhere_else() -> None:
+def test_rings_bend_at_every_corner_and_nowhere_else():
     rings = rings_of(np.ones((3, 5), np.bool_))
 
     assert [[0, 0], [5, 0], [5, 3], [0, 3]] == rings[0].tolist()
 
 
-def test_two_holes_that_share_a_corner_are_two_rings() -> None:
+def test_two_holes_that_share_a_corner_are_two_rings():
     """A ring that went on into the other hole would cross itself."""
     mask = np.ones((4, 4), np.bool_)
     mask[1, 2] = mask[2, 1] = False
@@ -147,7 +143,7 @@ def test_two_holes_that_share_a_corner_are_two_rings() -> None:
     assert [4, 4, 4] == [len(ring) for ring in rings_of(mask)]
 
 
-def test_an_empty_mask_has_no_ring() -> None:
+def test_an_empty_mask_has_no_ring():
     corners, starts = trace_rings(np.zeros((3, 4), np.bool_))
 
     assert (0, 2) == corners.shape

@@ -1,7 +1,5 @@
 """The mesh and its cells, against a look at every triangle and every wall."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -25,7 +23,7 @@ from fleet2d.kernels import locate, rasterize_cells, strictly_inside
 @pytest.mark.parametrize(
     ("point", "expected"), [((0, 2), 8), ((9, 0), 0), ((0, -2), -8), ((4, 1), 4)]
 )
-def test_orient_is_the_doubled_signed_area(point: tuple[int, int], expected: int) -> None:
+def test_orient_is_the_doubled_signed_area(point, expected):
     assert expected == orient(0, 0, 4, 0, *point)
 
 
@@ -41,9 +39,7 @@ def lowest_triangle(home: Home, x: int, y: int) -> int:
 
 @quick
 @given(homes(), seeds())
-def test_locate_returns_the_lowest_triangle_with_the_point(
-    polygons: list[Polygon], seed: int
-) -> None:
+def test_locate_returns_the_lowest_triangle_with_the_point(polygons, seed):
     home = home_of(polygons)
 
     for x, y in awkward_points(home, np.random.default_rng(seed), 3).tolist():
@@ -51,13 +47,13 @@ def test_locate_returns_the_lowest_triangle_with_the_point(
 
 
 @pytest.mark.parametrize(("x", "y"), [(-1, 5), (5, -1), (10**6, 5), (5, 10**6), (641, 5)])
-def test_locate_returns_outside_beyond_the_plan(x: int, y: int) -> None:
+def test_locate_returns_outside_beyond_the_plan(x, y):
     home = home_of([shapely.box(0, 0, 640, 640)])
 
     assert locate(home.mesh, x, y) == -1
 
 
-def test_every_triangle_is_listed_in_the_buckets_of_its_points() -> None:
+def test_every_triangle_is_listed_in_the_buckets_of_its_points():
     home = home_of([shapely.box(0, 0, 7 * BUCKET, 5 * BUCKET)])
 
     for x in range(0, 7 * BUCKET + 1, BUCKET // 2):
@@ -67,9 +63,7 @@ def test_every_triangle_is_listed_in_the_buckets_of_its_points() -> None:
 
 @quick
 @given(homes(), seeds())
-def test_strictly_inside_agrees_with_a_count_of_crossings(
-    polygons: list[Polygon], seed: int
-) -> None:
+def test_strictly_inside_agrees_with_a_count_of_crossings(polygons, seed):
     home = home_of(polygons)
     points = awkward_points(home, np.random.default_rng(seed), 5)
 
@@ -79,9 +73,7 @@ def test_strictly_inside_agrees_with_a_count_of_crossings(
 
 @quick
 @given(homes(), seeds(), st.integers(0, 2))
-def test_rasterized_cells_are_those_strictly_inside_in_every_mesh(
-    polygons: list[Polygon], seed: int, fewer: int
-) -> None:
+def test_rasterized_cells_are_those_strictly_inside_in_every_mesh(polygons, seed, fewer):
     home = home_of(polygons)
     rows, columns = home.rows - fewer, home.columns - 2 * fewer
     mesh = shuffled(home.mesh, np.random.default_rng(seed))
@@ -95,7 +87,7 @@ def test_rasterized_cells_are_those_strictly_inside_in_every_mesh(
         assert triangle == (locate(mesh, x, y) if triangle >= 0 else -1)
 
 
-def test_cells_on_a_diagonal_wall_are_not_free() -> None:
+def test_cells_on_a_diagonal_wall_are_not_free():
     # The diagonal runs exactly through the centres of the cells (k, k), and only through those.
     home = home_of([Polygon([(0, 0), (1280, 0), (1280, 1280)])])
 
@@ -105,7 +97,7 @@ def test_cells_on_a_diagonal_wall_are_not_free() -> None:
     assert free[4, 5]
 
 
-def test_cells_of_every_home_equal_the_free_cells_of_shapely(shared_data: Path) -> None:
+def test_cells_of_every_home_equal_the_free_cells_of_shapely(shared_data):
     for home in all_homes(shared_data):
         if home.rows * home.columns > 10**6:
             continue

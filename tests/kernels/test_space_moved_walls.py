@@ -14,7 +14,7 @@ from fleet2d.kernels import move_walls
 
 @quick
 @given(homes(), st.integers(0, 300), st.sampled_from([0.0, 0.41, 1.0]))
-def test_moved_walls_equal_the_slow_ones(polygons: list[Polygon], reach: int, part: float) -> None:
+def test_moved_walls_equal_the_slow_ones(polygons, reach, part):
     half = int(part * reach)
     for polygon in polygons:
         for ring in shapely.get_rings(shapely.orient_polygons(polygon)):
@@ -23,7 +23,7 @@ def test_moved_walls_equal_the_slow_ones(polygons: list[Polygon], reach: int, pa
             assert expected.tolist() == move_walls(corners, reach, half).tolist()
 
 
-def test_walls_of_a_room_move_inwards_and_those_of_a_pillar_outwards() -> None:
+def test_walls_of_a_room_move_inwards_and_those_of_a_pillar_outwards():
     room = np.array([(0, 0), (50, 0), (100, 0), (100, 80), (0, 80)])
     inner = [[90, 10], [90, 70], [10, 70], [10, 10]]
     assert sorted(inner) == sorted(move_walls(room, 10, 4).tolist())
@@ -38,7 +38,7 @@ WIDTHS = (0, 1, 4, 6)  # of the lines of a grid, whose cells are 1 to 3 wide
 
 
 @pytest.mark.parametrize("half_of", [0.0, 0.5, 1.0])
-def test_every_small_outline_equals_the_slow_one(half_of: float) -> None:
+def test_every_small_outline_equals_the_slow_one(half_of):
     """Steps, notches and pillars as narrow as the reach, and narrower."""
     cells = [
         shapely.box(WIDTHS[k % 3], WIDTHS[k // 3], WIDTHS[k % 3 + 1], WIDTHS[k // 3 + 1])
@@ -55,6 +55,6 @@ def test_every_small_outline_equals_the_slow_one(half_of: float) -> None:
                 assert slow.move_walls(*asked).tolist() == move_walls(*asked).tolist()
 
 
-def test_a_wall_that_turns_back_moves_nowhere() -> None:
+def test_a_wall_that_turns_back_moves_nowhere():
     ring = np.array([(0, 0), (10, 0), (5, 0), (5, 10), (0, 10)])
     assert 0 == len(slow.move_walls(ring, 1, 0)) == len(move_walls(ring, 1, 0))

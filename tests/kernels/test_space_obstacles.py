@@ -30,9 +30,7 @@ def corners_of(box: tuple[int, int, int, int]) -> list[tuple[int, int]]:
 
 @quick
 @given(homes(), octagons, st.lists(box, max_size=4))
-def test_obstacles_and_cuts_equal_the_slow_ones(
-    polygons: list[Polygon], octagon: tuple[int, int], boxes: list[tuple[int, int, int, int]]
-) -> None:
+def test_obstacles_and_cuts_equal_the_slow_ones(polygons, octagon, boxes):
     corners, ring_of = rings_of(polygons)
     walls = slow.walls_of(corners, ring_of)
     extents = [slow.grown(wall, *octagon) for wall in walls]
@@ -55,9 +53,7 @@ def test_obstacles_and_cuts_equal_the_slow_ones(
 
 @quick
 @given(st.lists(box, min_size=1, max_size=8), octagons)
-def test_no_cut_leaves_as_many_pieces_or_fewer(
-    boxes: list[tuple[int, int, int, int]], octagon: tuple[int, int]
-) -> None:
+def test_no_cut_leaves_as_many_pieces_or_fewer(boxes, octagon):
     room = shapely.box(-64, -64, 900, 900)
     table = wall_obstacles(*rings_of([room]), *octagon)
     walls = [slow.shape_of(row) for row in table[:, :8].tolist()]
@@ -74,7 +70,7 @@ def test_no_cut_leaves_as_many_pieces_or_fewer(
         space = shapely.difference(space, shape)
 
 
-def test_a_board_from_wall_to_wall_cuts_once_and_one_in_a_corner_never() -> None:
+def test_a_board_from_wall_to_wall_cuts_once_and_one_in_a_corner_never():
     room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
 
     assert 1 == add_obstacles(room, np.array([[190, 0, 210, 300]]), 20, 8)[1]
@@ -84,7 +80,7 @@ def test_a_board_from_wall_to_wall_cuts_once_and_one_in_a_corner_never() -> None
     assert 0 == add_obstacles(room, np.zeros((0, 4), np.int64), 20, 8)[1]
 
 
-def test_two_boxes_that_touch_each_other_and_two_walls_cut_once() -> None:
+def test_two_boxes_that_touch_each_other_and_two_walls_cut_once():
     room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
 
     table, cuts = add_obstacles(room, np.array([[190, 0, 210, 140]]), 20, 8)
@@ -93,7 +89,7 @@ def test_two_boxes_that_touch_each_other_and_two_walls_cut_once() -> None:
     assert 0 == add_obstacles(table, np.array([[190, 190, 210, 300]]), 20, 8)[1]
 
 
-def test_a_box_between_a_slanted_wall_and_another_may_cut() -> None:
+def test_a_box_between_a_slanted_wall_and_another_may_cut():
     """Their octagons don't meet at the slanted wall itself, but may where it is at most."""
     tent = wall_obstacles(*rings_of([Polygon([(0, 0), (400, 0), (400, 300)])]), 20, 8)
 
@@ -101,7 +97,7 @@ def test_a_box_between_a_slanted_wall_and_another_may_cut() -> None:
     assert 0 == add_obstacles(tent, np.array([[340, 0, 400, 20]]), 20, 8)[1]
 
 
-def test_sizes_that_fit_nothing_are_refused() -> None:
+def test_sizes_that_fit_nothing_are_refused():
     room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
     with pytest.raises(ValueError, match="half must be"):
         add_obstacles(room, np.zeros((0, 4), np.int64), 4, 5)

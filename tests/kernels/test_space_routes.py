@@ -2,13 +2,11 @@
 
 import math
 import pickle
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
-from shapely.geometry import Polygon
 from tests.meshed_homes import Home, home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
@@ -91,15 +89,13 @@ def check_routes(home: Home, rng: np.random.Generator, count: int) -> tuple[int,
 
 @quick
 @given(homes(), seeds())
-def test_find_route_is_as_short_as_dijkstra_over_all_corners(
-    polygons: list[Polygon], seed: int
-) -> None:
+def test_find_route_is_as_short_as_dijkstra_over_all_corners(polygons, seed):
     check_routes(home_of(polygons), np.random.default_rng(seed), 6)
 
 
 @quick
 @given(homes(), seeds())
-def test_find_route_does_not_depend_on_the_mesh(polygons: list[Polygon], seed: int) -> None:
+def test_find_route_does_not_depend_on_the_mesh(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
     other = home._replace(mesh=shuffled(home.mesh, rng))
     routes, other_routes = routes_of(home), routes_of(other)
@@ -127,13 +123,13 @@ def crowded(seed: int) -> Home:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_find_route_among_many_pillars_is_as_short_as_dijkstra(seed: int) -> None:
+def test_find_route_among_many_pillars_is_as_short_as_dijkstra(seed):
     bent, _ = check_routes(crowded(seed), np.random.default_rng(seed), 40)
 
     assert bent > 15
 
 
-def test_find_route_between_two_parts_is_none() -> None:
+def test_find_route_between_two_parts_is_none():
     home = home_of([shapely.box(0, 0, 640, 640), shapely.box(704, 0, 1344, 640)])
     routes = routes_of(home)
 
@@ -170,14 +166,14 @@ PILLARS = [shapely.box(128, 320, 320, 512), shapely.box(320, 128, 512, 320)]
         ),
     ],
 )
-def test_find_route_bends_where_it_has_to(free: Polygon, route: list[list[int]]) -> None:
+def test_find_route_bends_where_it_has_to(free, route):
     path = routes_of(home_of([free])).find(*route[0], *route[-1])
 
     assert path is not None
     assert route == path.tolist()
 
 
-def test_find_route_again_returns_an_array_of_its_own() -> None:
+def test_find_route_again_returns_an_array_of_its_own():
     routes = routes_of(home_of([shapely.box(0, 0, 640, 640)]))
 
     first = routes.find(33, 33, 601, 97)
@@ -188,7 +184,7 @@ def test_find_route_again_returns_an_array_of_its_own() -> None:
     assert [[33, 33], [601, 99]] == np.asarray(routes.find(33, 33, 601, 99)).tolist()
 
 
-def test_find_route_along_a_row_of_corners_touches_each() -> None:
+def test_find_route_along_a_row_of_corners_touches_each():
     """The straight line touches four corners: strictly no line of sight, but the shortest way."""
     pillars = [shapely.box(128, 64, 192, 320), shapely.box(384, 128, 448, 320)]
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.union_all(pillars))])
@@ -199,7 +195,7 @@ def test_find_route_along_a_row_of_corners_touches_each() -> None:
     assert length_of(path) == 448
 
 
-def test_routes_keep_their_mesh_and_can_be_pickled() -> None:
+def test_routes_keep_their_mesh_and_can_be_pickled():
     home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 100, 400, 600))])
     routes = routes_of(home)
 
@@ -225,7 +221,7 @@ def test_routes_keep_their_mesh_and_can_be_pickled() -> None:
         ("simple", lambda a: a[:-1]),
     ],
 )
-def test_routes_refuse_corners_that_are_none(field: str, change: Callable[[I64], I64]) -> None:
+def test_routes_refuse_corners_that_are_none(field, change):
     home = crowded(1)
     corners = corners_of(home)
 
@@ -233,7 +229,7 @@ def test_routes_refuse_corners_that_are_none(field: str, change: Callable[[I64],
         Routes(home.mesh, corners._replace(**{field: change(getattr(corners, field))}))
 
 
-def test_route_graph_has_each_leg_in_both_directions() -> None:
+def test_route_graph_has_each_leg_in_both_directions():
     routes = routes_of(crowded(1))
     begins = np.repeat(np.arange(len(routes.leg_start) - 1), np.diff(routes.leg_start))
     ends = zip(begins.tolist(), routes.leg_end.tolist(), strict=True)
@@ -247,5 +243,5 @@ def test_route_graph_has_each_leg_in_both_directions() -> None:
 @pytest.mark.parametrize(
     ("b", "expected"), [((0, 0), 0.0), ((3, 4), 5.0), ((2**20, 2**20), math.sqrt(2**41))]
 )
-def test_distance_is_the_correctly_rounded_root(b: tuple[int, int], expected: float) -> None:
+def test_distance_is_the_correctly_rounded_root(b, expected):
     assert expected == distance(0, 0, *b) == distance(*b, 0, 0)

@@ -24,7 +24,7 @@ def random_costs(rng: np.random.Generator, shape: tuple[int, int], walls: float)
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 8), (14, 11)])
 @pytest.mark.parametrize("walls", [0.0, 0.2, 0.5])
-def test_cheapest_cells_equal_those_of_brute_force(shape: tuple[int, int], walls: float) -> None:
+def test_cheapest_cells_equal_those_of_brute_force(shape, walls):
     rng = np.random.default_rng([*shape, int(10 * walls)])
     for _ in range(4):
         cost = random_costs(rng, shape, walls)
@@ -34,7 +34,7 @@ def test_cheapest_cells_equal_those_of_brute_force(shape: tuple[int, int], walls
             assert expected == cheapest_cells(cost, (row, column), goal).tolist()
 
 
-def test_cheapest_cells_lead_from_start_to_goal_over_open_cells() -> None:
+def test_cheapest_cells_lead_from_start_to_goal_over_open_cells():
     rng = np.random.default_rng(2)
     for _ in range(20):
         cost = random_costs(rng, (12, 15), 0.25)
@@ -56,7 +56,7 @@ def test_cheapest_cells_lead_from_start_to_goal_over_open_cells() -> None:
             assert least[start] == total
 
 
-def test_without_costs_the_cheapest_way_is_the_walking_distance() -> None:
+def test_without_costs_the_cheapest_way_is_the_walking_distance():
     free = np.random.default_rng(7).random((40, 30)) < 0.8
     free[5, 5] = True
     plain = walking_distance(free, np.array([[5, 5]]))
@@ -67,7 +67,7 @@ def test_without_costs_the_cheapest_way_is_the_walking_distance() -> None:
         assert plain[row, column] == np.where(steps == 2, 7, 5).sum()
 
 
-def test_unreachable_goal_is_reached_from_nowhere() -> None:
+def test_unreachable_goal_is_reached_from_nowhere():
     cost = np.full((3, 3), -1, np.int32)
     assert cheapest_cells(cost, (0, 0), (1, 1)).shape == (0, 2)
 
@@ -75,7 +75,7 @@ def test_unreachable_goal_is_reached_from_nowhere() -> None:
 @pytest.mark.parametrize(
     ("bx", "by"), [(700, 33), (33, 500), (741, 555), (600, 37), (33, 33), (65, 65)]
 )
-def test_leg_costs_the_same_in_both_directions_and_as_by_sampling(bx: int, by: int) -> None:
+def test_leg_costs_the_same_in_both_directions_and_as_by_sampling(bx, by):
     cost = random_costs(np.random.default_rng(3), (12, 20), 0.0)
     length = float(np.hypot(bx - 33, by - 33))
     shares = (np.arange(200_000) + 0.5) / 200_000
@@ -87,14 +87,14 @@ def test_leg_costs_the_same_in_both_directions_and_as_by_sampling(bx: int, by: i
         assert there == pytest.approx(back, rel=1e-9)
 
 
-def test_leg_through_a_closed_cell_or_out_of_the_grid_is_none() -> None:
+def test_leg_through_a_closed_cell_or_out_of_the_grid_is_none():
     cost = np.zeros((12, 20), np.int32)
     cost[3, 5] = -1
     assert leg_cost(cost, 33, 64 * 3 + 33, 64 * 10, 64 * 3 + 33) == np.inf
     assert leg_cost(cost, 33, 33, 64 * 20 + 5, 33) == np.inf
 
 
-def test_pulled_path_has_the_same_ends_and_never_costs_more() -> None:
+def test_pulled_path_has_the_same_ends_and_never_costs_more():
     rng = np.random.default_rng(4)
     straight = 0
     for walls in (0.0, 0.1, 0.3):

@@ -124,7 +124,7 @@ def use(thing: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_state_comes_back(kind: str) -> None:
+def test_a_state_comes_back(kind):
     thing = originals()[kind]
     again = pickle.loads(pickle.dumps(thing))
     first, second = pickle.dumps(thing.__getstate__()), pickle.dumps(again.__getstate__())
@@ -133,7 +133,7 @@ def test_a_state_comes_back(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_changed_state_is_refused_or_of_use(kind: str) -> None:
+def test_a_changed_state_is_refused_or_of_use(kind):
     cls, rng = getattr(_core, kind), random.Random(7)
     state, refused = originals()[kind].__getstate__(), 0
     for _ in range(CHANGES):
@@ -154,7 +154,7 @@ def test_a_changed_state_is_refused_or_of_use(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.filterwarnings("ignore")
-def test_an_object_without_a_state_is_no_crash(kind: str) -> None:
+def test_an_object_without_a_state_is_no_crash(kind):
     cls = getattr(_core, kind)
     empty = cls.__new__(cls)
     with pytest.raises((TypeError, RuntimeError)):

@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,7 +19,7 @@ HOME = "extends: bundled:paper\nsimulation: {duration: 3 h, start: 2026-01-05T07
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Workspace:
+def place(tmp_path):
     folder = tmp_path / "homes"
     folder.mkdir()
     (tmp_path / "secret.yaml").write_text("name: secret\n")
@@ -30,7 +29,7 @@ def place(tmp_path: Path) -> Workspace:
 
 
 @pytest.mark.slow
-def test_a_scenario_is_written_checked_run_and_asked(place: Workspace) -> None:
+def test_a_scenario_is_written_checked_run_and_asked(place):
     assert place.check("home.yaml")["users"] == ["ana"]
 
     result = place.run("home.yaml", "first", ["simulation.seed=7"])
@@ -44,7 +43,7 @@ def test_a_scenario_is_written_checked_run_and_asked(place: Workspace) -> None:
     assert place.picture("first").startswith(b"\x89PNG")
 
 
-def test_a_simulation_waits_for_interventions(place: Workspace) -> None:
+def test_a_simulation_waits_for_interventions(place):
     name = place.begin("home.yaml")
     place.advance(name, "10 min")
 
@@ -59,7 +58,7 @@ def test_a_simulation_waits_for_interventions(place: Workspace) -> None:
 
 
 @pytest.mark.parametrize("name", ["../secret.yaml", "/etc/passwd", "", ".", "a/../../secret.yaml"])
-def test_paths_out_of_the_folder_are_refused(place: Workspace, name: str) -> None:
+def test_paths_out_of_the_folder_are_refused(place, name):
     for use in (place.read, lambda n: place.write(n, "x"), place.check, place.picture):
         with pytest.raises(InputError, match="leads out of the folder"):
             use(name)
@@ -67,7 +66,7 @@ def test_paths_out_of_the_folder_are_refused(place: Workspace, name: str) -> Non
         place.run("home.yaml", name)
 
 
-def test_links_out_of_the_folder_are_refused(place: Workspace, tmp_path: Path) -> None:
+def test_links_out_of_the_folder_are_refused(place, tmp_path):
     (place.folder / "link.yaml").symlink_to(tmp_path / "secret.yaml")
 
     with pytest.raises(InputError, match="leads out of the folder"):
@@ -85,7 +84,7 @@ def test_links_out_of_the_folder_are_refused(place: Workspace, tmp_path: Path) -
         HOME + "users: {ana: {type: replay, path: ../secret.yaml}}\n",
     ],
 )
-def test_files_outside_and_code_are_refused(place: Workspace, text: str) -> None:
+def test_files_outside_and_code_are_refused(place, text):
     place.write("bad.yaml", text)
 
     with pytest.raises(Fleet2DError):
@@ -93,7 +92,7 @@ def test_files_outside_and_code_are_refused(place: Workspace, text: str) -> None
 
 
 @pytest.mark.parametrize("persona", ["{outside}", "../secret.yaml", "inside.yaml"])
-def test_nothing_outside_is_quoted_in_a_message(place: Workspace, persona: str) -> None:
+def test_nothing_outside_is_quoted_in_a_message(place, persona):
     """The message about a persona that was none began with the file's first line."""
     secret = place.folder.parent / "secret.yaml"
     secret.write_text("password 1234\n")
@@ -120,14 +119,14 @@ def test_nothing_outside_is_quoted_in_a_message(place: Workspace, persona: str) 
         ),
     ],
 )
-def test_a_wrong_file_is_told(place: Workspace, text: str, message: str) -> None:
+def test_a_wrong_file_is_told(place, text, message):
     place.write("bad.yaml", text)
 
     with pytest.raises(InputError, match=message):
         place.check("bad.yaml")
 
 
-def test_a_wrong_time_and_name_are_told(place: Workspace) -> None:
+def test_a_wrong_time_and_name_are_told(place):
     name = place.begin("home.yaml")
 
     with pytest.raises(InputError, match="is outside of the folder"):
@@ -147,9 +146,7 @@ def test_a_wrong_time_and_name_are_told(place: Workspace) -> None:
         ({"table": "events", "where": "step > soon"}, "there is no column 'soon'"),
     ],
 )
-def test_a_wrong_question_is_answered_with_what_there_is(
-    place: Workspace, question: dict[str, Any], message: str
-) -> None:
+def test_a_wrong_question_is_answered_with_what_there_is(place, question, message):
     place.run("home.yaml", "first", ["simulation.duration=1 min"])
 
     with pytest.raises(InputError, match=message):
@@ -160,7 +157,7 @@ def test_a_wrong_question_is_answered_with_what_there_is(
     ("where", "rows"),
     [("event == user_seen", 4), ("event == 'user_seen' and entity == 'astro'", 4)],
 )
-def test_conditions_of_rows_are_joined(place: Workspace, where: str, rows: int) -> None:
+def test_conditions_of_rows_are_joined(place, where, rows):
     """Only astro sees; a condition with `and` had 0 rows."""
     place.run("home.yaml", "first")
 
@@ -169,7 +166,7 @@ def test_conditions_of_rows_are_joined(place: Workspace, where: str, rows: int) 
         place.ask("first", "events", "event == usr_seen")
 
 
-def test_the_query_of_the_description_sums_durations(place: Workspace) -> None:
+def test_the_query_of_the_description_sums_durations(place):
     place.run("home.yaml", "first")
     query = (Workspace.ask.__doc__ or "").partition("[s]:\n")[2].partition("Args:")[0]
 
@@ -190,7 +187,7 @@ def test_the_query_of_the_description_sums_durations(place: Workspace) -> None:
     "text",
     ['{"extends": "SECRET"}', '{"extends": "../secret.yaml"}', '{"extends": "/etc/passwd"}'],
 )
-def test_a_json_file_leads_nowhere_else(place: Workspace, text: str) -> None:
+def test_a_json_file_leads_nowhere_else(place, text):
     """Only the files of YAML were looked through for paths."""
     place.write("inner.json", text.replace("SECRET", str(place.folder.parent / "secret.yaml")))
     place.write("bad.yaml", "extends: [bundled:paper, inner.json]\n")
@@ -202,7 +199,7 @@ def test_a_json_file_leads_nowhere_else(place: Workspace, text: str) -> None:
 @pytest.mark.parametrize(
     "name", ["\0", "a\0.yaml", "\x1b[2J.yaml", "a\nb.yaml", "\ud800.yaml", "x" * 5000 + ".yaml"]
 )
-def test_odd_names_are_refused_in_one_line(place: Workspace, name: str) -> None:
+def test_odd_names_are_refused_in_one_line(place, name):
     uses: list[Callable[[str], object]] = [
         place.read, lambda n: place.write(n, "x"), place.check, place.picture, place.begin,
         lambda n: place.run("home.yaml", n), lambda n: place.ask(n, "events"), place.finish,
@@ -219,7 +216,7 @@ def test_odd_names_are_refused_in_one_line(place: Workspace, name: str) -> None:
         assert str(caught.value).isprintable()
 
 
-def test_pipes_in_the_folder_are_refused_and_replaced(place: Workspace) -> None:
+def test_pipes_in_the_folder_are_refused_and_replaced(place):
     os.mkfifo(place.folder / "pipe.yaml")
 
     for use in (place.read, place.check):
@@ -229,16 +226,14 @@ def test_pipes_in_the_folder_are_refused_and_replaced(place: Workspace) -> None:
     assert place.read("pipe.yaml") == HOME
 
 
-def test_a_run_at_the_pace_of_a_clock_is_refused(place: Workspace) -> None:
+def test_a_run_at_the_pace_of_a_clock_is_refused(place):
     for use in (place.run, place.begin):
         with pytest.raises(InputError, match=r"override it by simulation\.speedup=null"):
             use("home.yaml", overrides=["simulation.speedup=0.001"])
 
 
 @pytest.mark.slow
-def test_a_call_simulates_for_a_limited_time(
-    place: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_call_simulates_for_a_limited_time(place, monkeypatch):
     name = place.begin("home.yaml", ["simulation.duration=5000 d"])
     monkeypatch.setattr(assistant, "MAX_S", 0.3)
 
@@ -259,9 +254,7 @@ def busy(*_: object, **__: object) -> None:
 
 
 @pytest.mark.parametrize("slow", ["load_scenario", "open_run"])
-def test_all_that_a_call_does_has_a_limited_time(
-    place: Workspace, monkeypatch: pytest.MonkeyPatch, slow: str
-) -> None:
+def test_all_that_a_call_does_has_a_limited_time(place, monkeypatch, slow):
     monkeypatch.setattr(assistant, "MAX_CALL_S", 0.3)
     monkeypatch.setattr(assistant, slow, busy)
     use = place.check if slow == "load_scenario" else place.picture
@@ -273,9 +266,7 @@ def test_all_that_a_call_does_has_a_limited_time(
     assert HOME == place.read("home.yaml")
 
 
-def test_a_simulation_whose_metrics_take_too_long_is_gone(
-    place: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_simulation_whose_metrics_take_too_long_is_gone(place, monkeypatch):
     name = place.begin("home.yaml")
     monkeypatch.setattr(assistant, "MAX_CALL_S", 0.3)
     for step in ("advance", "finish"):
@@ -287,7 +278,7 @@ def test_a_simulation_whose_metrics_take_too_long_is_gone(
         place.finish(name)
 
 
-def test_components_are_listed_by_part_and_briefly(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_components_are_listed_by_part_and_briefly(monkeypatch):
     described = schema.describe_components()
     monkeypatch.setattr(schema, "describe_components", lambda: described)  # which takes a while
     kinds = [line.partition(":")[0] for line in assistant.list_components().splitlines()]
@@ -302,7 +293,7 @@ def test_components_are_listed_by_part_and_briefly(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-def test_a_client_uses_the_tools(place: Workspace) -> None:
+def test_a_client_uses_the_tools(place):
     mcp = pytest.importorskip("mcp", reason="the extra mcp is not installed")
 
     async def use() -> tuple[set[str], Any, list[Any], list[Any]]:

@@ -4,7 +4,6 @@ import re
 import signal
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -59,7 +58,7 @@ def bridged(messages: dict[int, list[Any]], **options: Any) -> tuple[Any, Now, B
     return bridge.run(), peer, bridge
 
 
-def test_ctrl_c_within_a_step_ends_the_run_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_within_a_step_ends_the_run_after_it(monkeypatch):
     def press(_: object, span: Any) -> None:
         if span.first == 3:
             signal.raise_signal(signal.SIGINT)
@@ -71,7 +70,7 @@ def test_ctrl_c_within_a_step_ends_the_run_after_it(monkeypatch: pytest.MonkeyPa
     assert [0, 1, 2, 3] == [frame.step for frame in peer.frames]
 
 
-def test_poses_are_where_the_body_is() -> None:
+def test_poses_are_where_the_body_is():
     run, peer, bridge = bridged({k: [pose(k, heading_deg=90)] for k in range(10)})
 
     x, _ = place()
@@ -84,7 +83,7 @@ def test_poses_are_where_the_body_is() -> None:
 
 
 @pytest.mark.slow
-def test_a_recorded_live_run_gives_the_same_digest(tmp_path: Path) -> None:
+def test_a_recorded_live_run_gives_the_same_digest(tmp_path):
     x, y = place()
     seen = {
         "type": "detections",
@@ -103,7 +102,7 @@ def test_a_recorded_live_run_gives_the_same_digest(tmp_path: Path) -> None:
     assert fleet2d.reproduce(tmp_path / "run").digest == run.digest
 
 
-def test_frames_have_every_event_and_row_of_the_run() -> None:
+def test_frames_have_every_event_and_row_of_the_run():
     x, y = place()
     seen = {
         "type": "detections",
@@ -141,7 +140,7 @@ def test_frames_have_every_event_and_row_of_the_run() -> None:
         ("{" + '"a":[' * 100_000, "wrong: not JSON"),
     ],
 )
-def test_what_is_wrong_is_told_and_the_body_stands(message: Any, told: str) -> None:
+def test_what_is_wrong_is_told_and_the_body_stands(message, told):
     run, peer, bridge = bridged({0: [pose(0)], 5: [message]})
 
     assert bridge.counts["received"] == 2
@@ -155,7 +154,7 @@ def test_what_is_wrong_is_told_and_the_body_stands(message: Any, told: str) -> N
     assert len({frame.bodies["ana"]["x"] for frame in peer.frames}) == 1
 
 
-def test_lost_and_late_messages_are_counted_by_their_numbers() -> None:
+def test_lost_and_late_messages_are_counted_by_their_numbers():
     numbers = [0, 1, 4, 3, 5]
     _, peer, bridge = bridged({k: [pose(k, number=n)] for k, n in enumerate(numbers)})
 
@@ -163,7 +162,7 @@ def test_lost_and_late_messages_are_counted_by_their_numbers() -> None:
     assert peer.told == ["lost: 2 messages before number 4", "late: message 3 after 4"]
 
 
-def test_of_a_flood_only_some_is_applied() -> None:
+def test_of_a_flood_only_some_is_applied():
     flood = [{"type": "reading", "sensor": "front_door", "on": bool(k % 2)} for k in range(5000)]
     _, peer, bridge = bridged({0: flood}, max_per_step=100)
 
@@ -171,7 +170,7 @@ def test_of_a_flood_only_some_is_applied() -> None:
     assert peer.told == ["too many: more than 100 messages in a step"]
 
 
-def test_a_flood_does_not_fill_the_memory() -> None:
+def test_a_flood_does_not_fill_the_memory():
     bridge = Bridge(fleet2d.Simulation(LIVE), [Now({})], speed=0, max_per_step=10)
     post = bridge._post_of(0)
     for k in range(1000):
@@ -187,7 +186,7 @@ def test_a_flood_does_not_fill_the_memory() -> None:
 
 
 @pytest.mark.slow
-def test_only_the_last_pose_of_a_step_counts() -> None:
+def test_only_the_last_pose_of_a_step_counts():
     _, peer, bridge = bridged({0: [pose(k) for k in range(50)]})
 
     assert bridge.counts == {"received": 50, "applied": 1, "replaced": 49}
@@ -195,7 +194,7 @@ def test_only_the_last_pose_of_a_step_counts() -> None:
 
 
 @pytest.mark.slow
-def test_a_body_stands_when_poses_stop_and_moves_when_they_arrive_again() -> None:
+def test_a_body_stands_when_poses_stop_and_moves_when_they_arrive_again():
     told: list[str] = []
 
     def messages() -> Iterator[dict[str, Any]]:
@@ -213,7 +212,7 @@ def test_a_body_stands_when_poses_stop_and_moves_when_they_arrive_again() -> Non
     assert acts[:3] == ["put", "hold", "put"]
 
 
-def test_a_body_that_decides_itself_refuses_poses() -> None:
+def test_a_body_that_decides_itself_refuses_poses():
     content = LIVE | {"users": {"ana": {"type": "routine", "persona": "retired"}}}
     peer = Now({0: [pose(0)]})
 
@@ -225,7 +224,7 @@ def test_a_body_that_decides_itself_refuses_poses() -> None:
 
 
 @pytest.mark.slow
-def test_steps_begin_in_time() -> None:
+def test_steps_begin_in_time():
     simulation = fleet2d.Simulation(LIVE, "simulation.step=50 ms", "simulation.duration=1 s")
     began = time.monotonic()
 
@@ -237,7 +236,7 @@ def test_steps_begin_in_time() -> None:
     assert min(bridge.lateness_s) >= 0
 
 
-def test_a_function_may_intervene() -> None:
+def test_a_function_may_intervene():
     simulation = fleet2d.Simulation(LIVE)
 
     def send(frame: LiveStep) -> None:
@@ -264,7 +263,7 @@ def by(client: int, messages: dict[int, Any], **options: Any) -> tuple[Any, Now,
 GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_1"}
 
 
-def test_goals_of_a_client_that_is_gone_are_withdrawn_and_the_body_stands() -> None:
+def test_goals_of_a_client_that_is_gone_are_withdrawn_and_the_body_stands():
     run, peer, bridge = by(3, {0: GOAL, 5: None})
 
     assert [act["do"] for act in run.manifest["interventions"]] == ["send", "release"]
@@ -275,14 +274,14 @@ def test_goals_of_a_client_that_is_gone_are_withdrawn_and_the_body_stands() -> N
     assert bridge.counts["withdrawn"] == 1
 
 
-def test_goals_stay_if_they_are_to_be_kept() -> None:
+def test_goals_stay_if_they_are_to_be_kept():
     run, peer, _ = by(3, {0: GOAL, 5: None}, keeps_goals=True)
 
     assert [act["do"] for act in run.manifest["interventions"]] == ["send"]
     assert peer.told == []
 
 
-def test_a_body_that_decides_goes_on_by_itself_after_a_goal_is_withdrawn() -> None:
+def test_a_body_that_decides_goes_on_by_itself_after_a_goal_is_withdrawn():
     content = LIVE | {"robots": {"astro": {"behaviors": [{"type": "patrol"}]}}}
     peer = Now({0: [GOAL], 5: [None]})
 
@@ -292,7 +291,7 @@ def test_a_body_that_decides_goes_on_by_itself_after_a_goal_is_withdrawn() -> No
     assert len(places) > 1
 
 
-def test_a_goal_of_another_client_is_not_withdrawn() -> None:
+def test_a_goal_of_another_client_is_not_withdrawn():
     peer = Now({})
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=0)
     post = bridge._post_of(0)
@@ -302,7 +301,7 @@ def test_a_goal_of_another_client_is_not_withdrawn() -> None:
     assert [act["do"] for act in bridge.run().manifest["interventions"]] == ["send"]
 
 
-def test_clients_of_one_peer_count_their_own_messages() -> None:
+def test_clients_of_one_peer_count_their_own_messages():
     """The second one's number 0 came after the first one's 7, and was late."""
     bridge = Bridge(fleet2d.Simulation(LIVE), [Now({})], speed=0)
     post = bridge._post_of(0)
@@ -326,7 +325,7 @@ def sourced() -> dict[str, Any]:
     return LIVE | {"robots": {"astro": astro}, "objects": {"front_door": sensor}}
 
 
-def test_only_the_source_of_a_part_speaks_for_it() -> None:
+def test_only_the_source_of_a_part_speaks_for_it():
     x, y = place()
     messages = [
         GOAL,
@@ -345,17 +344,17 @@ def test_only_the_source_of_a_part_speaks_for_it() -> None:
     assert fleet2d.run(sourced()).status == "complete"  # without its sources
 
 
-def test_a_source_that_is_no_peer_is_refused() -> None:
+def test_a_source_that_is_no_peer_is_refused():
     with pytest.raises(InputError, match=r"astro takes messages of udp://127.0.0.1:9, which isn't"):
         Bridge(fleet2d.Simulation(sourced()), [Now({})])
 
 
-def test_a_wrong_address_of_a_source_is_refused() -> None:
+def test_a_wrong_address_of_a_source_is_refused():
     with pytest.raises(InputError, match="did you mean 'mqtt'"):
         fleet2d.Simulation(LIVE, "users.ana={type: live, source: 'mqt://nas:1'}")
 
 
-def test_a_scenario_does_not_talk_to_other_machines_by_itself() -> None:
+def test_a_scenario_does_not_talk_to_other_machines_by_itself():
     changed = fleet2d.load_scenario(LIVE, "users.ana={type: live, source: 'mqtt://example.com'}")
     with pytest.raises(InputError, match="would talk to mqtt"):
         open_peers(changed)
@@ -372,7 +371,7 @@ HALLWAY = GOAL | {"to": "hallway_1", "id": "second"}
 VELOCITY = {"type": "velocity", "entity": "astro", "forward": 0.1}
 
 
-def test_messages_of_one_step_count_in_the_order_of_their_arrival() -> None:
+def test_messages_of_one_step_count_in_the_order_of_their_arrival():
     acts, counts, _ = ordered(GOAL, VELOCITY, HALLWAY)
     assert acts == [("steer", None), ("send", "hallway_1")]
     assert counts == {"received": 3, "replaced": 1, "applied": 2}
@@ -382,7 +381,7 @@ def test_messages_of_one_step_count_in_the_order_of_their_arrival() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "first"])
-def test_a_goal_after_a_withdrawn_one_stays(name: str) -> None:
+def test_a_goal_after_a_withdrawn_one_stays(name):
     cancel = {"type": "cancel", "entity": "astro", "id": name}
 
     acts, counts, told = ordered(GOAL | {"id": "first"}, cancel, HALLWAY)
@@ -399,7 +398,7 @@ def test_a_goal_after_a_withdrawn_one_stays(name: str) -> None:
         (GOAL, GOAL | {"to": "kitchn_1"}),
     ],
 )
-def test_a_message_that_is_refused_replaces_none(right: Any, wrong: Any) -> None:
+def test_a_message_that_is_refused_replaces_none(right, wrong):
     alone, _, _ = ordered(right)
     acts, counts, told = ordered(right, wrong)
 
@@ -408,7 +407,7 @@ def test_a_message_that_is_refused_replaces_none(right: Any, wrong: Any) -> None
     assert len(told) == 1
 
 
-def test_a_message_of_another_than_the_source_replaces_none() -> None:
+def test_a_message_of_another_than_the_source_replaces_none():
     source, other = Now({3: [GOAL]}), Now({3: [HALLWAY]})
     peers = {SOURCE: source, "function": other}
     run = Bridge(fleet2d.Simulation(sourced()), peers, speed=0).run()
@@ -416,14 +415,14 @@ def test_a_message_of_another_than_the_source_replaces_none() -> None:
     assert [act["to"] for act in run.manifest["interventions"]] == ["kitchen_1"]
 
 
-def test_what_is_refused_is_tried_only_so_often() -> None:
+def test_what_is_refused_is_tried_only_so_often():
     acts, counts, _ = ordered(GOAL, *[GOAL | {"to": "kitchn_1"}] * 200)
 
     assert acts == []
     assert counts == {"received": 201, "wrong": 100, "replaced": 101}
 
 
-def test_a_goal_of_a_client_that_came_back_within_a_step_stays() -> None:
+def test_a_goal_of_a_client_that_came_back_within_a_step_stays():
     acts, counts, _ = ordered(GOAL, None, HALLWAY)  # type: ignore[arg-type]
     assert acts == [("send", "hallway_1")]
 
@@ -435,7 +434,7 @@ def test_a_goal_of_a_client_that_came_back_within_a_step_stays() -> None:
 # Frames that don't fit
 
 
-def test_a_pose_in_a_wall_is_moved_to_where_the_body_fits_and_told() -> None:
+def test_a_pose_in_a_wall_is_moved_to_where_the_body_fits_and_told():
     home = fleet2d.Simulation(LIVE).actors["ana"]
     x, y = place()
     lattice, space = home.home.plan.lattice, home.space
@@ -452,7 +451,7 @@ def test_a_pose_in_a_wall_is_moved_to_where_the_body_fits_and_told() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("off", [(-30.0, 0.0), (0.0, 1e4)])
-def test_a_pose_of_another_frame_is_told_with_its_distance(off: tuple[float, float]) -> None:
+def test_a_pose_of_another_frame_is_told_with_its_distance(off):
     x, y = place()
     message = {"type": "pose", "entity": "ana", "x": x + off[0], "y": min(y + off[1], 1e4)}
 
@@ -463,7 +462,7 @@ def test_a_pose_of_another_frame_is_told_with_its_distance(off: tuple[float, flo
     assert bridge.counts["wrong"] == 1
 
 
-def test_detections_outside_of_the_home_are_left_out_and_told() -> None:
+def test_detections_outside_of_the_home_are_left_out_and_told():
     x, y = place()
     seen = [{"user": "ana", "x": x, "y": y}, {"user": "ana", "x": x + 50, "y": y}]
     message = {"type": "detections", "entity": "astro", "detections": seen}
@@ -480,7 +479,7 @@ def test_detections_outside_of_the_home_are_left_out_and_told() -> None:
 # What is odd
 
 
-def test_each_reason_is_told_once_and_counted_in_the_summary() -> None:
+def test_each_reason_is_told_once_and_counted_in_the_summary():
     away = [pose(0) | {"x": 100.0 + k} for k in range(40)]
     unknown = [pose(0) | {"entity": "bob"}] * 3
 
@@ -491,7 +490,7 @@ def test_each_reason_is_told_once_and_counted_in_the_summary() -> None:
     assert run.manifest["notes"][-2:] == [f"live: 25 {peer.told[0]}", f"live: 3 {peer.told[1]}"]
 
 
-def test_a_flood_of_different_reasons_is_bounded() -> None:
+def test_a_flood_of_different_reasons_is_bounded():
     names = [chr(ord("a") + k // 26) + chr(ord("a") + k % 26) for k in range(200)]
     run, peer, bridge = bridged({0: [pose(0) | {"entity": f"x{name}"} for name in names]})
 
@@ -501,7 +500,7 @@ def test_a_flood_of_different_reasons_is_bounded() -> None:
 
 
 @pytest.mark.parametrize("off_s", [-60.0, 60.0])
-def test_a_message_of_another_time_is_left_out(off_s: float) -> None:
+def test_a_message_of_another_time_is_left_out(off_s):
     _, peer, bridge = bridged({0: [pose(0, time=time.time() + off_s)]})
 
     assert bridge.counts == {"received": 1, "late": 1}
@@ -509,9 +508,7 @@ def test_a_message_of_another_time_is_left_out(off_s: float) -> None:
     assert re.search(told, peer.told[0])
 
 
-def test_a_message_before_the_last_one_of_its_body_is_late(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_message_before_the_last_one_of_its_body_is_late(monkeypatch):
     now = time.time()
     # The clock stands still: else a busy machine takes so long that the first one is late, too.
     clock = SimpleNamespace(time=lambda: now, monotonic=time.monotonic)
@@ -524,7 +521,7 @@ def test_a_message_before_the_last_one_of_its_body_is_late(
 
 
 @pytest.mark.slow
-def test_a_pose_in_millimetres_is_told_as_such() -> None:
+def test_a_pose_in_millimetres_is_told_as_such():
     x, y = place()
     _, peer, bridge = bridged({0: [pose(0) | {"x": 1000 * x % 1e4, "y": 1000 * y}]})
     assert bridge.counts["wrong"] == 1
@@ -533,7 +530,7 @@ def test_a_pose_in_millimetres_is_told_as_such() -> None:
     assert peer.told[0].endswith("by its coordinates: in millimetres they would")
 
 
-def test_a_body_that_jumps_is_told() -> None:
+def test_a_body_that_jumps_is_told():
     x, y = place("bedroom_1")
     elsewhere = pose(0) | {"x": x, "y": y}
     _, peer, bridge = bridged({k: [elsewhere if k % 2 else pose(0)] for k in range(4)})
@@ -542,7 +539,7 @@ def test_a_body_that_jumps_is_told() -> None:
     assert re.fullmatch(r"jumps: ana: a pose is \d+\.\d m from the one 1 s before", peer.told[0])
 
 
-def test_two_programs_that_send_poses_of_one_body_are_told() -> None:
+def test_two_programs_that_send_poses_of_one_body_are_told():
     first, second = Now({0: [pose(0)]}), Now({1: [pose(1)]})
     bridge = Bridge(fleet2d.Simulation(LIVE), [first, second], speed=0)
     bridge.run()
@@ -551,7 +548,7 @@ def test_two_programs_that_send_poses_of_one_body_are_told() -> None:
     assert bridge.counts == {"received": 2, "applied": 2, "of two senders": 1}
 
 
-def test_two_programs_whose_poses_come_within_one_step_are_told() -> None:
+def test_two_programs_whose_poses_come_within_one_step_are_told():
     first, second = Now({0: [pose(0)]}), Now({0: [pose(1)]})
     bridge = Bridge(fleet2d.Simulation(LIVE), [first, second], speed=0)
     bridge.run()
@@ -560,7 +557,7 @@ def test_two_programs_whose_poses_come_within_one_step_are_told() -> None:
     assert bridge.counts["replaced"] == 1
 
 
-def test_a_goal_keeps_its_heading() -> None:
+def test_a_goal_keeps_its_heading():
     goal = {"type": "goal", "entity": "astro", "to": list(place()), "heading_deg": 90}
     run, _, _ = bridged({0: [goal]})
 
@@ -568,7 +565,7 @@ def test_a_goal_keeps_its_heading() -> None:
 
 
 @pytest.mark.slow
-def test_an_iterator_that_fails_is_told_in_a_line(capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_iterator_that_fails_is_told_in_a_line(capfd):
     def messages() -> Iterator[dict[str, Any]]:
         yield pose(0)
         raise ValueError("no more")

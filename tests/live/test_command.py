@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 import typer
@@ -23,7 +22,7 @@ APP.command()(live)
 SCENARIO = "extends: bundled:paper\nsimulation: {duration: 3 s}\nusers: {ana: {type: live}}\n"
 
 
-def test_a_run_among_datagrams_is_stored_and_reproduced(tmp_path: Path) -> None:
+def test_a_run_among_datagrams_is_stored_and_reproduced(tmp_path):
     (tmp_path / "lab.yaml").write_text(SCENARIO)
     arguments = [str(tmp_path / "lab.yaml"), "--with", "udp://127.0.0.1:0", "--speed", "0"]
 
@@ -36,7 +35,7 @@ def test_a_run_among_datagrams_is_stored_and_reproduced(tmp_path: Path) -> None:
     assert fleet2d.reproduce(tmp_path / "run").digest == digest
 
 
-def test_a_run_that_heard_messages_is_reproduced(tmp_path: Path) -> None:
+def test_a_run_that_heard_messages_is_reproduced(tmp_path):
     """The note about what had arrived was missing when it was repeated."""
     x, y = place()
     messages = [{"type": "pose", "entity": "ana", "x": x, "y": y}, {"type": "?"}]
@@ -48,7 +47,7 @@ def test_a_run_that_heard_messages_is_reproduced(tmp_path: Path) -> None:
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
-def test_sources_of_the_scenario_are_opened(tmp_path: Path) -> None:
+def test_sources_of_the_scenario_are_opened(tmp_path):
     text = SCENARIO.replace("{type: live}", "{type: live, source: 'udp://127.0.0.1:0'}")
     (tmp_path / "lab.yaml").write_text(text)
 
@@ -58,7 +57,7 @@ def test_sources_of_the_scenario_are_opened(tmp_path: Path) -> None:
     assert "udp://127.0.0.1:0: listens at " in result.output
 
 
-def test_the_schema_of_messages_is_printed() -> None:
+def test_the_schema_of_messages_is_printed():
     schema = json.loads(CliRunner().invoke(APP, ["--schema"]).output)
 
     assert schema["discriminator"]["propertyName"] == "type"
@@ -67,16 +66,14 @@ def test_the_schema_of_messages_is_printed() -> None:
     ].keys()
 
 
-def test_a_program_has_to_be_named() -> None:
+def test_a_program_has_to_be_named():
     with pytest.raises(InputError, match="name at least one other program by --with"):
         CliRunner().invoke(APP, [], catch_exceptions=False)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_a_run_that_was_ended_is_continued_by_resume(
-    tmp_path: Path, number: signal.Signals
-) -> None:
+def test_a_run_that_was_ended_is_continued_by_resume(tmp_path, number):
     """Nothing said so: the same command only asked for another folder."""
     (tmp_path / "lab.yaml").write_text("extends: bundled:paper\nsimulation: {duration: 2 h}\n")
     arguments = ["live", str(tmp_path / "lab.yaml"), "--with", "udp://127.0.0.1:0"]

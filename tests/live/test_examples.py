@@ -10,13 +10,13 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "live"
 pytestmark = pytest.mark.slow
 
 
-def test_a_behavior_tree_finds_her(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_behavior_tree_finds_her(capsys):
     pytest.importorskip("py_trees", reason="py_trees is not installed")
     runpy.run_path(str(EXAMPLES / "tree.py"))
     assert capsys.readouterr().out == "the tree ends in SUCCESS\n"
 
 
-def test_a_plan_of_pddl_is_carried_out(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plan_of_pddl_is_carried_out(capsys):
     pytest.importorskip("pyperplan", reason="pyperplan is not installed")
     runpy.run_path(str(EXAMPLES / "plan.py"))
     lines = capsys.readouterr().out.splitlines()
@@ -25,7 +25,7 @@ def test_a_plan_of_pddl_is_carried_out(capsys: pytest.CaptureFixture[str]) -> No
     assert lines == sorted(lines)  # times
 
 
-def test_a_language_model_answers_from_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_language_model_answers_from_a_run(capsys):
     pytest.importorskip("mcp", reason="the extra mcp is not installed")
     runpy.run_path(str(EXAMPLES / "talk.py"))
     *calls, answer = capsys.readouterr().out.splitlines()
@@ -35,6 +35,6 @@ def test_a_language_model_answers_from_a_run(capsys: pytest.CaptureFixture[str])
     assert answer.startswith("She sleeps 10.")
 
 
-def test_each_is_short() -> None:
+def test_each_is_short():
     for name in ("tree", "plan", "talk"):
         assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) <= 60

@@ -3,7 +3,6 @@
 import json
 import socket
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -29,13 +28,13 @@ def names(states: list[Any]) -> list[tuple[str, str]]:
     return [(state.id, str(state.state)) for state in states]
 
 
-def test_a_goal_is_accepted_under_way_and_reached() -> None:
+def test_a_goal_is_accepted_under_way_and_reached():
     states = told({0: [GOAL]}, simulation=LIVE["simulation"] | {"duration": "90 s"})
 
     assert names(states) == [("g1", "accepted"), ("g1", "under_way"), ("g1", "reached")]
 
 
-def test_what_is_left_of_the_way_falls_to_nothing() -> None:
+def test_what_is_left_of_the_way_falls_to_nothing():
     peer = Now({0: [GOAL]})
     changes = "simulation.duration=90 s"
     Bridge(fleet2d.Simulation(LIVE, changes), [peer], speed=0).run()
@@ -50,14 +49,14 @@ def test_what_is_left_of_the_way_falls_to_nothing() -> None:
     ("to", "reason"),
     [("kitchn", "kitchen"), ([50.0, 50.0], "wall"), ("ana_", "no")],
 )
-def test_an_impossible_goal_is_told_with_its_reason(to: Any, reason: str) -> None:
+def test_an_impossible_goal_is_told_with_its_reason(to, reason):
     (state,) = told({0: [GOAL | {"to": to}]})
 
     assert state.state == "impossible"
     assert reason in state.detail
 
 
-def test_goals_end_by_others_by_poses_by_steering_and_when_they_are_withdrawn() -> None:
+def test_goals_end_by_others_by_poses_by_steering_and_when_they_are_withdrawn():
     x, y = place()
     other = GOAL | {"id": "g2", "to": "bathroom_1"}
     pose = {"type": "pose", "entity": "astro", "x": x, "y": y}
@@ -75,7 +74,7 @@ def test_goals_end_by_others_by_poses_by_steering_and_when_they_are_withdrawn() 
     assert names(told({0: [GOAL], 3: [cancel]})) == begun
 
 
-def test_only_a_goal_that_a_body_has_is_withdrawn() -> None:
+def test_only_a_goal_that_a_body_has_is_withdrawn():
     bridge = Bridge(
         fleet2d.Simulation(LIVE),
         [Now({0: [GOAL], 2: [{"type": "cancel", "entity": "astro", "id": "g0"}]})],
@@ -87,21 +86,21 @@ def test_only_a_goal_that_a_body_has_is_withdrawn() -> None:
     assert "live: 1 wrong: astro has no goal 'g0'" in bridge.notes()
 
 
-def test_two_goals_in_one_step_end_each_once() -> None:
+def test_two_goals_in_one_step_end_each_once():
     states = told({0: [GOAL, GOAL | {"id": "g2"}]})
 
     assert names(states)[:2] == [("g1", "impossible"), ("g2", "accepted")]
     assert states[0].detail == "another goal came at once"
 
 
-def test_an_order_of_a_script_ends_a_goal() -> None:
+def test_an_order_of_a_script_ends_a_goal():
     states = told({0: [GOAL]}, script=[{"at": "5 s", "hold": "astro"}])
 
     assert names(states)[-1] == ("g1", "cancelled")
     assert states[-1].detail == "the body has another order, or none"
 
 
-def test_a_shut_door_blocks_a_goal_until_it_is_open() -> None:
+def test_a_shut_door_blocks_a_goal_until_it_is_open():
     door = {"type": "door", "doorway": "bathroom_1", "open": False}
     simulation = LIVE["simulation"] | {"duration": "3 min"}
     opens = [{"at": "1 min", "open": "door"}]
@@ -120,7 +119,7 @@ def test_a_shut_door_blocks_a_goal_until_it_is_open() -> None:
     assert "can't be reached" in next(s.detail for s in states if s.state == "blocked")
 
 
-def test_a_robot_whose_battery_is_empty_is_blocked() -> None:
+def test_a_robot_whose_battery_is_empty_is_blocked():
     robot = LIVE["robots"]["astro"] | {
         "battery": {"driving": "1 h", "standing": "2 h", "charging": "1 h", "charger": "any"}
     }
@@ -134,7 +133,7 @@ def test_a_robot_whose_battery_is_empty_is_blocked() -> None:
     assert states[-1].detail == "it can't move"
 
 
-def test_goals_and_velocities_repeat_to_the_same_digest(tmp_path: Path) -> None:
+def test_goals_and_velocities_repeat_to_the_same_digest(tmp_path):
     steer = {"type": "velocity", "entity": "astro", "forward": 0.2, "turn_deg": -20}
     peer = Now(
         {
@@ -150,7 +149,7 @@ def test_goals_and_velocities_repeat_to_the_same_digest(tmp_path: Path) -> None:
     assert fleet2d.reproduce(tmp_path / "run").digest == run.digest
 
 
-def test_who_sends_a_datagram_hears_what_becomes_of_its_goal() -> None:
+def test_who_sends_a_datagram_hears_what_becomes_of_its_goal():
     peer = UdpPeer("127.0.0.1", 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
         program.settimeout(5)

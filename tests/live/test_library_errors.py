@@ -9,7 +9,7 @@ from fleet2d.live.library_errors import LIBRARIES, libraries_told
 
 
 @pytest.mark.parametrize("name", LIBRARIES)
-def test_an_error_of_a_library_is_one_line(name: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_error_of_a_library_is_one_line(name, capfd):
     told: list[str] = []
     logger = logging.getLogger(f"{name}.server")
     with libraries_told(told.append):
@@ -25,7 +25,7 @@ def test_an_error_of_a_library_is_one_line(name: str, capfd: pytest.CaptureFixtu
     assert capfd.readouterr().err == ""
 
 
-def test_a_thread_that_fails_is_one_line(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_thread_that_fails_is_one_line(capfd):
     def fail() -> None:
         raise RuntimeError("gone")
 
@@ -39,7 +39,7 @@ def test_a_thread_that_fails_is_one_line(capfd: pytest.CaptureFixture[str]) -> N
     assert capfd.readouterr().err == ""
 
 
-def test_loggers_and_threads_are_as_before_afterwards() -> None:
+def test_loggers_and_threads_are_as_before_afterwards():
     logger = logging.getLogger(LIBRARIES[0])
     before = logger.handlers, logger.propagate, threading.excepthook
     with libraries_told(print):

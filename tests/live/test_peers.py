@@ -30,7 +30,7 @@ def in_background(bridge: Bridge) -> tuple[threading.Thread, list[Any]]:
 
 
 @pytest.mark.slow
-def test_datagrams_move_a_body() -> None:
+def test_datagrams_move_a_body():
     peer: Any = open_peer("udp://127.0.0.1:0")
     port, simulation = peer.port, fleet2d.Simulation(LIVE)  # it is closed when the run ends
     thread, runs = in_background(Bridge(simulation, [peer], speed=30))
@@ -47,7 +47,7 @@ def test_datagrams_move_a_body() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["udp", "ws"])
-def test_an_address_in_use_is_refused(scheme: str) -> None:
+def test_an_address_in_use_is_refused(scheme):
     if scheme == "ws":
         pytest.importorskip("websockets", reason="the extra live is not installed")
     kind = socket.SOCK_DGRAM if scheme == "udp" else socket.SOCK_STREAM
@@ -73,12 +73,12 @@ def test_an_address_in_use_is_refused(scheme: str) -> None:
         ("", ""),
     ],
 )
-def test_a_wrong_address_is_refused(address: str, why: str) -> None:
+def test_a_wrong_address_is_refused(address, why):
     with pytest.raises(InputError, match=f"is not the address of a peer{why}"):
         open_peer(address)
 
 
-def test_a_client_hears_all_and_sends_goals() -> None:
+def test_a_client_hears_all_and_sends_goals():
     pytest.importorskip("websockets", reason="the extra live is not installed")
     from websockets.sync.client import connect
 
@@ -104,7 +104,7 @@ def test_a_client_hears_all_and_sends_goals() -> None:
 
 
 @pytest.mark.slow
-def test_a_client_that_leaves_does_not_stop_the_run() -> None:
+def test_a_client_that_leaves_does_not_stop_the_run():
     pytest.importorskip("websockets", reason="the extra live is not installed")
     from websockets.sync.client import connect
 
@@ -129,9 +129,7 @@ def shaken(port: int) -> socket.socket:
 
 
 @pytest.mark.slow
-def test_a_client_that_never_reads_is_disconnected_and_told(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_client_that_never_reads_is_disconnected_and_told(monkeypatch, capfd):
     pytest.importorskip("websockets", reason="the extra live is not installed")
     monkeypatch.setattr(peers, "MAX_QUEUE", 20)
     peer: Any = open_peer("ws://127.0.0.1:0")
@@ -153,9 +151,7 @@ def test_a_client_that_never_reads_is_disconnected_and_told(
 
 
 @pytest.mark.slow
-def test_clients_that_speak_no_websocket_leave_no_traceback(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_clients_that_speak_no_websocket_leave_no_traceback(capfd):
     pytest.importorskip("websockets", reason="the extra live is not installed")
     peer: Any = open_peer("ws://127.0.0.1:0")
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=15)
@@ -173,7 +169,7 @@ def test_clients_that_speak_no_websocket_leave_no_traceback(
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_pages_of_other_sites_are_refused() -> None:
+def test_pages_of_other_sites_are_refused():
     """Any page that is open in a browser of this machine could send a robot somewhere."""
     pytest.importorskip("websockets", reason="the extra live is not installed")
     from websockets.exceptions import InvalidStatus
@@ -192,7 +188,7 @@ def test_pages_of_other_sites_are_refused() -> None:
 
 
 @pytest.mark.slow
-def test_a_page_in_chromium_shows_a_run_and_sends_a_robot() -> None:
+def test_a_page_in_chromium_shows_a_run_and_sends_a_robot():
     pytest.importorskip("websockets", reason="the extra live is not installed")
     pages = partial(SimpleHTTPRequestHandler, directory=str(EXAMPLES / "live"))
     with chromium() as browser, ThreadingHTTPServer(("127.0.0.1", 0), pages) as server:
@@ -217,7 +213,7 @@ def test_a_page_in_chromium_shows_a_run_and_sends_a_robot() -> None:
     assert f"the run is over: {runs[0].digest}" in log
 
 
-def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path: Path) -> None:
+def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path):
     websockets = pytest.importorskip("websockets", reason="the extra live is not installed")
     content = LIVE | {
         "users": {

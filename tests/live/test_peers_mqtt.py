@@ -23,7 +23,7 @@ BROKER = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin"
 
 
 @pytest.fixture
-def mosquitto(tmp_path: Path) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]:
+def mosquitto(tmp_path):
     """Start Mosquitto on a free port."""
     port = free_port()
     with mosquitto_at(port, tmp_path) as process:
@@ -56,7 +56,7 @@ def mosquitto_at(port: int, tmp_path: Path) -> Iterator["subprocess.Popen[bytes]
 
 
 @pytest.fixture
-def broker(mosquitto: tuple[int, "subprocess.Popen[bytes]"]) -> int:
+def broker(mosquitto):
     return mosquitto[0]
 
 
@@ -88,7 +88,7 @@ class Client:
 
 
 @pytest.mark.slow
-def test_a_broker_passes_on_what_happens_and_what_arrives(broker: int) -> None:
+def test_a_broker_passes_on_what_happens_and_what_arrives(broker):
     client = Client(broker)
     peer = open_peer(f"mqtt://127.0.0.1:{broker}/home/one")
     content = LIVE | {
@@ -123,9 +123,7 @@ def test_a_broker_passes_on_what_happens_and_what_arrives(broker: int) -> None:
 
 
 @pytest.mark.slow
-def test_goals_are_withdrawn_when_the_broker_is_gone(
-    mosquitto: tuple[int, "subprocess.Popen[bytes]"],
-) -> None:
+def test_goals_are_withdrawn_when_the_broker_is_gone(mosquitto):
     port, process = mosquitto
     peer = open_peer(f"mqtt://127.0.0.1:{port}/home")
     told: list[str] = []
@@ -147,9 +145,7 @@ def test_goals_are_withdrawn_when_the_broker_is_gone(
     ]
 
 
-def test_a_broker_that_is_missing_is_told_and_hears_the_run_once_it_is_there(
-    tmp_path: Path,
-) -> None:
+def test_a_broker_that_is_missing_is_told_and_hears_the_run_once_it_is_there(tmp_path):
     port = free_port()
     told: list[str] = []
     peer = open_peer(f"mqtt://127.0.0.1:{port}/home")
@@ -165,7 +161,7 @@ def test_a_broker_that_is_missing_is_told_and_hears_the_run_once_it_is_there(
     assert client.of("home/status")[-2:] == ["online", "offline"]
 
 
-def test_an_unknown_host_of_a_broker_is_refused() -> None:
+def test_an_unknown_host_of_a_broker_is_refused():
     with pytest.raises(InputError, match=r"mqtt://no\.such\.host\.invalid:1883: "):
         open_peer("mqtt://no.such.host.invalid")
 
@@ -203,7 +199,7 @@ ACCEPTED = b"\x20\x02\x00\x00"
     ("code", "reason"),
     [(1, "Unsupported protocol version"), (4, "Bad user name or password"), (5, "Not authorized")],
 )
-def test_a_broker_that_refuses_is_not_connected(code: int, reason: str) -> None:
+def test_a_broker_that_refuses_is_not_connected(code, reason):
     port = answering(lambda kind, _: bytes([0x20, 2, 0, code]) if kind == CONNECT else b"")
     with pytest.raises(InputError) as caught:
         open_peer(f"mqtt://127.0.0.1:{port}/lab")
@@ -212,7 +208,7 @@ def test_a_broker_that_refuses_is_not_connected(code: int, reason: str) -> None:
     )
 
 
-def test_a_broker_that_refuses_the_subscription_is_not_connected() -> None:
+def test_a_broker_that_refuses_the_subscription_is_not_connected():
     def answer(kind: int, content: bytes) -> bytes:
         return ACCEPTED if kind == CONNECT else b"\x90\x03" + content[:2] + b"\x80"
 
@@ -221,14 +217,14 @@ def test_a_broker_that_refuses_the_subscription_is_not_connected() -> None:
 
 
 @pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 200 OK\r\n\r\nhello", ACCEPTED])
-def test_a_server_that_is_no_broker_is_told(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_that_is_no_broker_is_told(answer, monkeypatch):
     monkeypatch.setattr(peers, "WAIT_S", 0.5)
     port = answering(lambda kind, _: answer if kind == CONNECT else b"")
     with pytest.raises(InputError, match=r"nothing there answers within 0\.5 s as a broker does"):
         open_peer(f"mqtt://127.0.0.1:{port}/lab")
 
 
-def test_user_and_password_of_an_address_are_sent() -> None:
+def test_user_and_password_of_an_address_are_sent():
     seen: list[bytes] = []
 
     def answer(kind: int, content: bytes) -> bytes:
@@ -242,7 +238,7 @@ def test_user_and_password_of_an_address_are_sent() -> None:
 
 
 @pytest.mark.slow
-def test_a_broker_that_was_restarted_gets_all_that_it_keeps() -> None:
+def test_a_broker_that_was_restarted_gets_all_that_it_keeps():
     published: list[list[str]] = []
 
     def answer(kind: int, content: bytes) -> bytes:
@@ -282,7 +278,7 @@ def test_a_broker_that_was_restarted_gets_all_that_it_keeps() -> None:
 
 
 @pytest.mark.slow
-def test_messages_before_the_run_begins_are_kept() -> None:
+def test_messages_before_the_run_begins_are_kept():
     """A broker sends what it retains at once, while the simulation is still being made."""
     reading = b'{"type": "reading", "sensor": "front_door", "on": true}'
     retained = b"\x00\x08lab/in/x" + reading

@@ -1,7 +1,6 @@
 """Questions in SQL: right answers, or an error that names what is there; and nothing else is read."""
 
 from datetime import datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -24,7 +23,7 @@ SEEN = [
 
 
 @pytest.fixture(scope="module")
-def tables() -> dict[str, pa.Table]:
+def tables():
     step, entity, event, room = zip(*SEEN, strict=True)
     events = pa.table(
         {
@@ -61,13 +60,13 @@ def rows(tables: dict[str, pa.Table], query: str) -> list[list[Any]]:
         ("room IS NULL", 0),
     ],
 )
-def test_conditions_select_rows(tables: dict[str, pa.Table], condition: str, count: int) -> None:
+def test_conditions_select_rows(tables, condition, count):
     found = answer(tables, f"SELECT * FROM events WHERE {condition}", 1)
 
     assert (found["rows"], len(found["shown"])) == (count, min(count, 1))
 
 
-def test_groups_have_sums_counts_and_durations(tables: dict[str, pa.Table]) -> None:
+def test_groups_have_sums_counts_and_durations(tables):
     """How long in each room; its first, last and longest stay."""
     stays = (
         "WITH stays AS (SELECT entity, room, time, lead(time) OVER (PARTITION BY entity ORDER BY"
@@ -83,7 +82,7 @@ def test_groups_have_sums_counts_and_durations(tables: dict[str, pa.Table]) -> N
     assert rows(tables, counts) == [[3, 2]]
 
 
-def test_tables_are_joined_nested_and_ordered(tables: dict[str, pa.Table]) -> None:
+def test_tables_are_joined_nested_and_ordered(tables):
     pairs = "SELECT a.step, b.step FROM events a JOIN events b USING (room) WHERE a.step < b.step"
 
     assert sorted(rows(tables, pairs)) == [[0, 60], [0, 100], [60, 100], [90, 400]]
@@ -118,15 +117,13 @@ def test_tables_are_joined_nested_and_ordered(tables: dict[str, pa.Table]) -> No
         ("SELECT '" + "x" * 10_000 + "'", "the query has 10009 characters"),
     ],
 )
-def test_what_is_not_there_is_an_error(
-    tables: dict[str, pa.Table], query: str, message: str
-) -> None:
+def test_what_is_not_there_is_an_error(tables, query, message):
     with pytest.raises(InputError, match=message) as caught:
         answer(tables, query)
     assert "\n" not in str(caught.value)
 
 
-def test_a_text_of_the_query_itself_is_no_value_of_the_table(tables: dict[str, pa.Table]) -> None:
+def test_a_text_of_the_query_itself_is_no_value_of_the_table(tables):
     kinds = "SELECT CASE room WHEN 'hall' THEN 'way' ELSE 'room' END AS room FROM events"
 
     assert answer(tables, f"SELECT * FROM ({kinds}) WHERE room = 'way'")["rows"] == 2
@@ -216,9 +213,7 @@ def test_a_text_of_the_query_itself_is_no_value_of_the_table(tables: dict[str, p
         "SELECT \x1b[2J",
     ],
 )
-def test_a_query_reads_and_changes_nothing_else(
-    tables: dict[str, pa.Table], tmp_path: Path, query: str
-) -> None:
+def test_a_query_reads_and_changes_nothing_else(tables, tmp_path, query):
     local_frame = tables["events"]  # DuckDB would find a variable of the caller by its name
     (tmp_path / "secret.csv").write_text("password\n1234\n")
     query = query.replace("FILE", str(tmp_path / "secret.csv")).replace("OUT", str(tmp_path / "o"))
@@ -232,7 +227,7 @@ def test_a_query_reads_and_changes_nothing_else(
     assert str(caught.value).isprintable()
 
 
-def test_long_answers_are_cut_and_say_so(tables: dict[str, pa.Table]) -> None:
+def test_long_answers_are_cut_and_say_so(tables):
     many = "SELECT a.step FROM events a, events b, events c, events d"
 
     found = answer(tables, many, 10_000)
@@ -257,9 +252,7 @@ def test_long_answers_are_cut_and_say_so(tables: dict[str, pa.Table]) -> None:
         ("SELECT count(*) FROM " + ", ".join(f"events e{k}" for k in range(40)), "takes more than"),
     ],
 )  # fmt: skip
-def test_an_answer_takes_limited_time_and_memory(
-    tables: dict[str, pa.Table], monkeypatch: pytest.MonkeyPatch, query: str, message: str
-) -> None:
+def test_an_answer_takes_limited_time_and_memory(tables, monkeypatch, query, message):
     monkeypatch.setattr(questions, "MAX_S", 0.5)
 
     with pytest.raises(InputError, match=message):
@@ -275,9 +268,7 @@ def test_an_answer_takes_limited_time_and_memory(
         ("SET threads = 9", "configuration has been locked"),
     ],
 )
-def test_the_database_itself_is_closed(
-    tables: dict[str, pa.Table], tmp_path: Path, query: str, message: str
-) -> None:
+def test_the_database_itself_is_closed(tables, tmp_path, query, message):
     """Also if a query were not refused before."""
     import duckdb
 

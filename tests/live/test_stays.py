@@ -29,7 +29,7 @@ def rooms(who: str) -> list[str]:
 
 
 @pytest.mark.parametrize("who", ["ana", "cleo", "astro"])
-def test_rooms_are_summed_as_step_by_step(who: str) -> None:
+def test_rooms_are_summed_as_step_by_step(who):
     steps = rooms(who)
     rows = {row["name"]: row for row in summary(run(), who)}
 
@@ -45,7 +45,7 @@ def test_rooms_are_summed_as_step_by_step(who: str) -> None:
         assert row["longest_hours"] <= row["hours"]
 
 
-def test_hours_are_shares_of_what_was_simulated_of_them() -> None:
+def test_hours_are_shares_of_what_was_simulated_of_them():
     steps = rooms("cleo")
     inside: Counter[int] = Counter()
     passed: Counter[int] = Counter()
@@ -61,7 +61,7 @@ def test_hours_are_shares_of_what_was_simulated_of_them() -> None:
 
 
 @pytest.mark.parametrize("of", ["kitchen", "kitchen_1", "bedroom", "away"])
-def test_days_split_stays_at_midnight(of: str) -> None:
+def test_days_split_stays_at_midnight(of):
     names = {room.name for room in run().plan.rooms if of in (room.name, room.type)} or {of}
     days: Counter[str] = Counter()
     for step, room in enumerate(rooms("ana")):
@@ -73,7 +73,7 @@ def test_days_split_stays_at_midnight(of: str) -> None:
     }
 
 
-def test_activities_follow_each_other_to_the_end() -> None:
+def test_activities_follow_each_other_to_the_end():
     stays = stays_of(run(), "ben", "activity")
     assert all(a.end == b.begin for a, b in pairwise(stays))
     assert stays[-1].end == run().clock.steps
@@ -89,6 +89,6 @@ def test_activities_follow_each_other_to_the_end() -> None:
         (("ana", "hour"), "name a room, a kind of room or an activity"),
     ],
 )
-def test_a_wrong_question_is_told(arguments: tuple[str, ...], message: str) -> None:
+def test_a_wrong_question_is_told(arguments, message):
     with pytest.raises(InputError, match=message):
         summary(run(), *arguments)  # type: ignore[arg-type]

@@ -21,7 +21,7 @@ def speeds(tmp_path: Path, *moves: list[tuple[float, float, float]]) -> list[lis
     return np.round(twists(plan, before, after, 2.0), 3).tolist()
 
 
-def test_speeds_are_those_of_the_frame_of_the_robot(tmp_path: Path) -> None:
+def test_speeds_are_those_of_the_frame_of_the_robot(tmp_path):
     found = speeds(
         tmp_path,
         [(1, 1, 0), (2, 1, 0)],
@@ -36,7 +36,7 @@ def test_speeds_are_those_of_the_frame_of_the_robot(tmp_path: Path) -> None:
     assert found[3] == [0.0, 0.0, 0.0]
 
 
-def test_stairs_have_no_length(tmp_path: Path) -> None:
+def test_stairs_have_no_length(tmp_path):
     """Their ends are 10 m apart in the plan, which was a speed of 5 m/s."""
     down, up = (0.5, 3.5, 0.0), (10.5, 3.5, 0.0)
     beyond = (9.0, 3.5, 0.0)
@@ -47,11 +47,11 @@ def test_stairs_have_no_length(tmp_path: Path) -> None:
     assert 0 < found[2][0] < 0.75
 
 
-def test_a_walk_across_the_middle_between_the_ends_keeps_its_length(tmp_path: Path) -> None:
+def test_a_walk_across_the_middle_between_the_ends_keeps_its_length(tmp_path):
     assert speeds(tmp_path, [(4.0, 1, 0), (5.0, 1, 0)]) == [[0.5, 0.0, 0.0]]
 
 
-def test_a_move_is_as_long_as_metrics_have_it(tmp_path: Path) -> None:
+def test_a_move_is_as_long_as_metrics_have_it(tmp_path):
     path = tmp_path / "house.json"
     path.write_text(json.dumps(PLAN))
     plan = fleet2d.load_floorplan(path)

@@ -1,6 +1,5 @@
 """Poses of bags: topics and frames, ROS 1 and ROS 2, and what is wrong in bags of real robots."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ def drive(ros: Ros, topic: str = "/odom", begin: int = NINE) -> list[Row]:
 
 
 @pytest.fixture(params=[1, 2])
-def ros(request: pytest.FixtureRequest) -> Ros:
+def ros(request):
     return Ros(request.param)
 
 
@@ -29,7 +28,7 @@ def name_of(ros: Ros) -> str:
     return "drive" if ros.version == 2 else "drive.bag"
 
 
-def test_odometry_is_read_in_the_local_time_of_the_home(ros: Ros, tmp_path: Path) -> None:
+def test_odometry_is_read_in_the_local_time_of_the_home(ros, tmp_path):
     log: Any = read_log(ros.bag(tmp_path / name_of(ros), drive(ros)), time_zone="Europe/Berlin")
 
     assert ("bag", "2026-01-05") == (log.layout, str(log.first_day))
@@ -40,19 +39,19 @@ def test_odometry_is_read_in_the_local_time_of_the_home(ros: Ros, tmp_path: Path
     assert ("/odom: 10 poses in the frame 'map'",) == log.notes
 
 
-def test_zone_is_asked_for(ros: Ros, tmp_path: Path) -> None:
+def test_zone_is_asked_for(ros, tmp_path):
     path = ros.bag(tmp_path / name_of(ros), drive(ros))
     with pytest.raises(LogError, match="say which local time the home has by time_zone"):
         read_log(path)
 
 
-def test_simulated_clock_counts_from_the_first_message(ros: Ros, tmp_path: Path) -> None:
+def test_simulated_clock_counts_from_the_first_message(ros, tmp_path):
     log: Any = read_log(ros.bag(tmp_path / name_of(ros), drive(ros, begin=5 * 10**9)))
 
     assert (None, 0, 9 * 10**6) == (log.first_day, log.time_us[0], log.time_us[-1])
 
 
-def test_one_of_several_poses_is_selected(ros: Ros, tmp_path: Path) -> None:
+def test_one_of_several_poses_is_selected(ros, tmp_path):
     rows = drive(ros) + drive(ros, "/amcl")
     path = ros.bag(tmp_path / name_of(ros), rows)
 
@@ -64,7 +63,7 @@ def test_one_of_several_poses_is_selected(ros: Ros, tmp_path: Path) -> None:
     assert 10 == len(log.time_us)
 
 
-def test_frame_is_followed_through_its_tree(ros: Ros, tmp_path: Path) -> None:
+def test_frame_is_followed_through_its_tree(ros, tmp_path):
     """A corrected odometry: the robot drives along its own x, the map turned by a quarter."""
     rows: list[Row] = [
         ("/tf_static", TF, NINE, ros.transform(0, "base_link", "lidar", (0.1, 0.0, 0.0)))
@@ -89,7 +88,7 @@ def test_frame_is_followed_through_its_tree(ros: Ros, tmp_path: Path) -> None:
     )
 
 
-def test_frame_with_two_parents_is_refused(tmp_path: Path) -> None:
+def test_frame_with_two_parents_is_refused(tmp_path):
     ros = Ros(2)
     rows = [
         ("/tf", TF, NINE, ros.transform(NINE, parent, "base_link", (0.0, 0.0, 0.0)))
@@ -101,7 +100,7 @@ def test_frame_with_two_parents_is_refused(tmp_path: Path) -> None:
         read_log(ros.bag(tmp_path / "bag", rows), time_zone="UTC", id="base_link")
 
 
-def test_poses_in_odom_are_transformed_to_the_map(ros: Ros, tmp_path: Path) -> None:
+def test_poses_in_odom_are_transformed_to_the_map(ros, tmp_path):
     rows = [moved(ros, "odom"), stamped(ros, "odom")]
     log: Any = read_log(ros.bag(tmp_path / name_of(ros), rows), time_zone="UTC")
 
@@ -115,13 +114,7 @@ def test_poses_in_odom_are_transformed_to_the_map(ros: Ros, tmp_path: Path) -> N
         ("map", (0.0, 0.0, 1.414, 1.414), (7.2, 4.0), np.pi / 2),
     ],
 )
-def test_a_robot_is_where_its_bag_has_it_in_the_map(
-    frame: str,
-    turn: tuple[float, ...],
-    place: tuple[float, float],
-    heading: float,
-    tmp_path: Path,
-) -> None:
+def test_a_robot_is_where_its_bag_has_it_in_the_map(frame, turn, place, heading, tmp_path):
     """A drive along x at 2 cm/s from (7, 4), with `/tf` from map to odom by 2 m."""
     ros, rows = Ros(2), [moved(Ros(2), "odom")]
     for second in range(20):
@@ -144,7 +137,7 @@ def test_a_robot_is_where_its_bag_has_it_in_the_map(
 
 
 @pytest.mark.parametrize("spelling", ["/odom", "odom"])
-def test_a_slash_before_a_frame_makes_no_difference(spelling: str, tmp_path: Path) -> None:
+def test_a_slash_before_a_frame_makes_no_difference(spelling, tmp_path):
     ros = Ros(1)
     rows = [moved(ros, "odom", "/map"), stamped(ros, spelling)]
     log: Any = read_log(ros.bag(tmp_path / "drive.bag", rows), time_zone="UTC")
@@ -152,7 +145,7 @@ def test_a_slash_before_a_frame_makes_no_difference(spelling: str, tmp_path: Pat
     assert log.xy.tolist() == [[9.0, 4.0]]
 
 
-def test_frames_of_namespaces_are_followed_to_their_own_map(tmp_path: Path) -> None:
+def test_frames_of_namespaces_are_followed_to_their_own_map(tmp_path):
     ros = Ros(2)
     rows = [
         moved(ros, "bob/odom", "bob/map", x=5.0),
@@ -164,7 +157,7 @@ def test_frames_of_namespaces_are_followed_to_their_own_map(tmp_path: Path) -> N
     assert log.xy.tolist() == [[9.0, 4.0]]
 
 
-def test_a_map_below_odom_is_found(tmp_path: Path) -> None:
+def test_a_map_below_odom_is_found(tmp_path):
     ros = Ros(2)
     rows = [moved(ros, "map", "odom"), stamped(ros, "odom")]
     log: Any = read_log(ros.bag(tmp_path / "bag", rows), time_zone="UTC", id="/pose")
@@ -176,9 +169,7 @@ def test_a_map_below_odom_is_found(tmp_path: Path) -> None:
     ("links", "listed"),
     [([], "none"), ([("base_link", "odom")], "base_link, odom"), ([("x", "map")], "x, map")],
 )
-def test_poses_without_a_way_to_the_map_are_refused(
-    links: list[tuple[str, str]], listed: str, tmp_path: Path
-) -> None:
+def test_poses_without_a_way_to_the_map_are_refused(links, listed, tmp_path):
     ros = Ros(2)
     rows = [*(moved(ros, *link) for link in links), stamped(ros, "odom")]
     path = ros.bag(tmp_path / "bag", rows)
@@ -193,7 +184,7 @@ def test_poses_without_a_way_to_the_map_are_refused(
     assert log.xy.tolist() == [[7.0, 4.0]]
 
 
-def test_poses_before_the_first_transform_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_poses_before_the_first_transform_are_left_out_and_counted(tmp_path):
     ros = Ros(2)
     late = NINE + 7 * 10**9
     link: Row = ("/tf", TF, late, ros.transform(late, "map", "odom", (2.0, 0.0, 0.0)))
@@ -207,7 +198,7 @@ def test_poses_before_the_first_transform_are_left_out_and_counted(tmp_path: Pat
     assert "7 poses before the first transform from 'odom' to 'map' were left out" in log.notes
 
 
-def test_a_bag_whose_transforms_come_too_late_is_refused(tmp_path: Path) -> None:
+def test_a_bag_whose_transforms_come_too_late_is_refused(tmp_path):
     ros = Ros(2)
     link: Row = ("/tf", TF, NINE, ros.transform(NINE + 1, "map", "odom", (2.0, 0.0, 0.0)))
     path = ros.bag(tmp_path / "bag", [link, stamped(ros, "odom")])
@@ -215,7 +206,7 @@ def test_a_bag_whose_transforms_come_too_late_is_refused(tmp_path: Path) -> None
         read_log(path, time_zone="UTC", id="/pose")
 
 
-def test_poses_without_a_frame_count_as_in_the_map(tmp_path: Path) -> None:
+def test_poses_without_a_frame_count_as_in_the_map(tmp_path):
     ros = Ros(2)
     log: Any = read_log(ros.bag(tmp_path / "bag", [stamped(ros, "")]), time_zone="UTC")
 
@@ -233,9 +224,7 @@ def test_poses_without_a_frame_count_as_in_the_map(tmp_path: Path) -> None:
         ((0.6, 0.0, 0.0, 0.8), 0.0, "1 poses are tilted by more than 45 degrees"),
     ],
 )
-def test_quaternions_are_normalized_or_say_nothing(
-    turn: tuple[float, ...], heading: float, note: str, tmp_path: Path
-) -> None:
+def test_quaternions_are_normalized_or_say_nothing(turn, heading, note, tmp_path):
     ros = Ros(2)
     log: Any = read_log(ros.bag(tmp_path / "bag", [stamped(ros, "map", turn)]), time_zone="UTC")
 
@@ -244,7 +233,7 @@ def test_quaternions_are_normalized_or_say_nothing(
     assert log.notes[-1].startswith(note)
 
 
-def test_a_transform_without_a_turn_is_left_out_and_counted(tmp_path: Path) -> None:
+def test_a_transform_without_a_turn_is_left_out_and_counted(tmp_path):
     ros = Ros(2)
     broken = ros.transform(NINE, "map", "odom", (50.0, 0.0, 0.0))
     broken.transforms[0].transform.rotation.w = 0.0
@@ -255,7 +244,7 @@ def test_a_transform_without_a_turn_is_left_out_and_counted(tmp_path: Path) -> N
     assert "1 transforms without a place or a turn were left out" in log.notes
 
 
-def test_odometry_of_a_sensor_is_told(tmp_path: Path) -> None:
+def test_odometry_of_a_sensor_is_told(tmp_path):
     ros = Ros(2)
     row = ("/vio", ODOMETRY, NINE, ros.odometry(NINE, 1.0, 2.0, 0.0, "map", "camera_link"))
     log: Any = read_log(ros.bag(tmp_path / "bag", [row]), time_zone="UTC")
@@ -263,14 +252,14 @@ def test_odometry_of_a_sensor_is_told(tmp_path: Path) -> None:
     assert log.notes[-1] == "/vio: these are poses of 'camera_link', not of a base_link"
 
 
-def test_a_frame_that_never_moves_is_refused(tmp_path: Path) -> None:
+def test_a_frame_that_never_moves_is_refused(tmp_path):
     ros = Ros(2)
     dock: Row = ("/tf_static", TF, NINE, ros.transform(0, "map", "dock", (1.0, 0.0, 0.0)))
     with pytest.raises(LogError, match="the frame 'dock' never moves in 'map'"):
         read_log(ros.bag(tmp_path / "bag", [dock]), time_zone="UTC", id="dock")
 
 
-def test_a_transform_topic_is_read(tmp_path: Path) -> None:
+def test_a_transform_topic_is_read(tmp_path):
     ros = Ros(2)
     kind = "geometry_msgs/msg/TransformStamped"
     one = ros.transform(NINE, "map", "astro", (3.0, 4.0, 0.5)).transforms[0]
@@ -280,7 +269,7 @@ def test_a_transform_topic_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.heading, 0.5)
 
 
-def test_all_publishers_of_a_topic_are_read(tmp_path: Path) -> None:
+def test_all_publishers_of_a_topic_are_read(tmp_path):
     """ROS 1 keeps a connection for each: only the last one's messages were read."""
     from rosbags.rosbag1 import Writer
 
@@ -298,7 +287,7 @@ def test_all_publishers_of_a_topic_are_read(tmp_path: Path) -> None:
     assert log.xy[:, 0].tolist() == [0.0, 1.0]
 
 
-def test_a_simulated_clock_may_begin_at_zero(ros: Ros, tmp_path: Path) -> None:
+def test_a_simulated_clock_may_begin_at_zero(ros, tmp_path):
     """The stamp 0 was replaced by the time of recording, of another clock."""
     rows = [(*row[:2], NINE + i, row[3]) for i, row in enumerate(drive(ros, begin=0))]
     log: Any = read_log(ros.bag(tmp_path / name_of(ros), rows))
@@ -306,7 +295,7 @@ def test_a_simulated_clock_may_begin_at_zero(ros: Ros, tmp_path: Path) -> None:
     assert (None, 0, 9 * 10**6) == (log.first_day, log.time_us[0], log.time_us[-1])
 
 
-def test_transforms_in_a_circle_are_refused(tmp_path: Path) -> None:
+def test_transforms_in_a_circle_are_refused(tmp_path):
     ros = Ros(2)
     rows = [
         ("/tf", TF, NINE, ros.transform(NINE, *names, (0.0, 0.0, 0.0)))
@@ -316,7 +305,7 @@ def test_transforms_in_a_circle_are_refused(tmp_path: Path) -> None:
         read_log(ros.bag(tmp_path / "bag", rows), time_zone="UTC", id="a")
 
 
-def test_stamps_that_run_backwards_are_refused_or_sorted(ros: Ros, tmp_path: Path) -> None:
+def test_stamps_that_run_backwards_are_refused_or_sorted(ros, tmp_path):
     rows = drive(ros)
     rows[3], rows[7] = rows[7], rows[3]
     rows = [(*row[:2], NINE + i, row[3]) for i, row in enumerate(rows)]
@@ -328,7 +317,7 @@ def test_stamps_that_run_backwards_are_refused_or_sorted(ros: Ros, tmp_path: Pat
     assert [float(i) for i in range(10)] == log.xy[:, 0].tolist()
 
 
-def test_bag_without_poses_lists_its_topics(tmp_path: Path) -> None:
+def test_bag_without_poses_lists_its_topics(tmp_path):
     ros = Ros(2)
     row = ("/chatter", "std_msgs/msg/String", NINE, ros.new("std_msgs/msg/String", "hello"))
     with pytest.raises(LogError, match="no poses: no odometry, poses or /tf among /chatter"):
@@ -344,7 +333,7 @@ def _noise(path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [_cut, _noise])
-def test_damaged_bag_is_one_line(damage: Callable[[Path], None], tmp_path: Path) -> None:
+def test_damaged_bag_is_one_line(damage, tmp_path):
     path = Ros(1).bag(tmp_path / "drive.bag", drive(Ros(1)))
     damage(path)
     with pytest.raises(LogError, match=r"drive\.bag can't be read as a bag") as caught:
@@ -352,7 +341,7 @@ def test_damaged_bag_is_one_line(damage: Callable[[Path], None], tmp_path: Path)
     assert "\n" not in str(caught.value)
 
 
-def test_columns_are_not_for_bags(ros: Ros, tmp_path: Path) -> None:
+def test_columns_are_not_for_bags(ros, tmp_path):
     path = ros.bag(tmp_path / name_of(ros), drive(ros))
     with pytest.raises(LogError, match="columns are for tables"):
         read_log(path, columns={"x": "east"})
@@ -360,7 +349,7 @@ def test_columns_are_not_for_bags(ros: Ros, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bag", "run.mcap"])
-def test_exported_run_is_driven_again(name: str, tmp_path: Path) -> None:
+def test_exported_run_is_driven_again(name, tmp_path):
     """There and back: a robot that follows the bag of a run is where it was in that run."""
     first = fleet2d.run("bundled:paper", "simulation.duration=40 min", seed=4)
     fleet2d.export(first, tmp_path / name)

@@ -23,7 +23,7 @@ def write(folder: Path, text: str, name: str = "seen.csv") -> Path:
     return path
 
 
-def test_a_table_keeps_all_detections_of_an_instant(tmp_path: Path) -> None:
+def test_a_table_keeps_all_detections_of_an_instant(tmp_path):
     log = read_detections(write(tmp_path, ROWS))
 
     assert log.labels == ("ana", "ben")
@@ -34,7 +34,7 @@ def test_a_table_keeps_all_detections_of_an_instant(tmp_path: Path) -> None:
     assert log.days == 1
 
 
-def test_json_lines_and_parquet_hold_the_same_as_csv(tmp_path: Path) -> None:
+def test_json_lines_and_parquet_hold_the_same_as_csv(tmp_path):
     import pyarrow.csv as pacsv
     import pyarrow.parquet as pq
 
@@ -56,7 +56,7 @@ def test_json_lines_and_parquet_hold_the_same_as_csv(tmp_path: Path) -> None:
         assert log.label.tolist() == logs[0].label.tolist()
 
 
-def test_columns_are_named_by_the_scenario(tmp_path: Path) -> None:
+def test_columns_are_named_by_the_scenario(tmp_path):
     path = write(tmp_path, "when,face,east,north\n0,f7,1,2\n5,f9,3,4\n")
     names = {"time": "when", "user": "face", "x": "east", "y": "north"}
 
@@ -87,16 +87,14 @@ def test_columns_are_named_by_the_scenario(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_table_with_errors_is_refused(
-    tmp_path: Path, text: str, options: dict[str, object], message: str
-) -> None:
+def test_a_table_with_errors_is_refused(tmp_path, text, options, message):
     with pytest.raises(LogError) as caught:
         read_detections(write(tmp_path, text), **options)  # type: ignore[arg-type]
 
     assert message in str(caught.value)
 
 
-def test_epochs_become_local_times_with_summer_time(tmp_path: Path) -> None:
+def test_epochs_become_local_times_with_summer_time(tmp_path):
     # 2026-03-29 00:59:59 and 01:00:01 UTC: in Berlin 01:59:59 and 03:00:01.
     path = write(tmp_path, "time,x,y\n1774745999,1,1\n1774746001,1,1\n")
 
@@ -105,7 +103,7 @@ def test_epochs_become_local_times_with_summer_time(tmp_path: Path) -> None:
     assert (log.time_us // 1_000_000).tolist() == [7199, 10801]
 
 
-def test_the_hour_that_is_repeated_is_left_out_with_a_note(tmp_path: Path) -> None:
+def test_the_hour_that_is_repeated_is_left_out_with_a_note(tmp_path):
     # 2026-10-25 00:30 and 01:30 UTC are both 02:30 in Berlin.
     path = write(tmp_path, "time,x,y\n1792888200,1,1\n1792891800,1,1\n1792895400,1,1\n")
 
@@ -115,7 +113,7 @@ def test_the_hour_that_is_repeated_is_left_out_with_a_note(tmp_path: Path) -> No
     assert "1 detections of the hour that the end of summer time repeats" in log.notes[0]
 
 
-def test_sorted_rows_are_counted(tmp_path: Path) -> None:
+def test_sorted_rows_are_counted(tmp_path):
     log = read_detections(write(tmp_path, "time,x,y\n5,1,1\n3,2,2\n"), sort=True)
 
     assert log.time_us.tolist() == [0, 2_000_000] or log.time_us.tolist() == [3_000_000, 5_000_000]
@@ -133,9 +131,7 @@ MOMENT = [  # 2026-03-29 00:59:59.5 UTC, an instant before summer time begins in
 
 
 @pytest.mark.parametrize("text", MOMENT)
-def test_seconds_milli_micro_nanoseconds_and_zones_are_one_moment(
-    tmp_path: Path, text: str
-) -> None:
+def test_seconds_milli_micro_nanoseconds_and_zones_are_one_moment(tmp_path, text):
     path = write(tmp_path, f"time,x,y\n{text},1,1\n")
 
     log = read_detections(path, time_zone="Europe/Berlin")
@@ -145,7 +141,7 @@ def test_seconds_milli_micro_nanoseconds_and_zones_are_one_moment(
         read_detections(path)
 
 
-def test_a_jump_of_the_clock_is_told_with_its_line_and_size(tmp_path: Path) -> None:
+def test_a_jump_of_the_clock_is_told_with_its_line_and_size(tmp_path):
     rows = "2025-01-01 00:00:00,1,1\n2026-01-01 00:00:00,1,1\n2026-01-01 00:00:01,1,1\n"
 
     log = read_detections(write(tmp_path, "time,x,y\n" + rows))
@@ -153,7 +149,7 @@ def test_a_jump_of_the_clock_is_told_with_its_line_and_size(tmp_path: Path) -> N
     assert log.notes == ("line 3: the time jumps forward by 365.0 days there",)
 
 
-def test_a_clock_that_was_set_after_it_began_at_1970_is_refused(tmp_path: Path) -> None:
+def test_a_clock_that_was_set_after_it_began_at_1970_is_refused(tmp_path):
     path = write(tmp_path, "time,x,y\n3,1,1\n1774745999,1,1\n1774746001,1,1\n")
 
     with pytest.raises(
@@ -162,7 +158,7 @@ def test_a_clock_that_was_set_after_it_began_at_1970_is_refused(tmp_path: Path) 
         read_detections(path, time_zone="UTC")
 
 
-def test_times_with_and_without_a_zone_are_refused(tmp_path: Path) -> None:
+def test_times_with_and_without_a_zone_are_refused(tmp_path):
     path = write(tmp_path, "time,x,y\n2026-01-01 00:00:00,1,1\n2026-01-01T05:00:01Z,1,1\n")
 
     with pytest.raises(LogError, match="some of its times have a time zone and some have none"):
@@ -181,7 +177,7 @@ def bag(folder: Path, run: object) -> Path:
 
 
 @pytest.fixture(scope="module")
-def simulated() -> object:
+def simulated():
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
     import fleet2d
 
@@ -190,7 +186,7 @@ def simulated() -> object:
     )
 
 
-def test_detections_of_a_bag_are_those_of_the_run(tmp_path: Path, simulated: object) -> None:
+def test_detections_of_a_bag_are_those_of_the_run(tmp_path, simulated):
     table = simulated.tables["observations"]  # type: ignore[attr-defined]
 
     log = read_detections(bag(tmp_path, simulated), time_zone="UTC")
@@ -203,9 +199,7 @@ def test_detections_of_a_bag_are_those_of_the_run(tmp_path: Path, simulated: obj
     assert seconds.tolist() == table["step"].to_numpy().tolist()
 
 
-def test_fields_of_a_topic_are_those_that_the_scenario_maps(
-    tmp_path: Path, simulated: object
-) -> None:
+def test_fields_of_a_topic_are_those_that_the_scenario_maps(tmp_path, simulated):
     path = bag(tmp_path, simulated)
     fields = {"each": "detections", "user": "id", "x": "results.0.pose.pose.position.x"}
 
@@ -232,9 +226,7 @@ def test_fields_of_a_topic_are_those_that_the_scenario_maps(
         ),
     ],
 )
-def test_a_wrong_topic_or_field_of_a_bag_is_refused(
-    tmp_path: Path, simulated: object, options: dict[str, object], message: str
-) -> None:
+def test_a_wrong_topic_or_field_of_a_bag_is_refused(tmp_path, simulated, options, message):
     with pytest.raises(LogError) as caught:
         read_detections(bag(tmp_path, simulated), time_zone="UTC", **options)  # type: ignore[arg-type]
 
@@ -259,7 +251,7 @@ def camera(ros: Ros) -> Row:
     return "/tf_static", TF, NINE, message
 
 
-def test_detections_of_a_camera_are_transformed_to_the_map(tmp_path: Path) -> None:
+def test_detections_of_a_camera_are_transformed_to_the_map(tmp_path):
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
     ros = Ros(2)
     robot: Row = ("/tf", TF, NINE, ros.transform(NINE, "map", "base_link", (5.0, 1.0, np.pi / 2)))
@@ -269,7 +261,7 @@ def test_detections_of_a_camera_are_transformed_to_the_map(tmp_path: Path) -> No
     np.testing.assert_allclose(log.xy, [[5.0, 4.1]], atol=1e-9)
 
 
-def test_detections_relative_to_the_robot_are_in_its_base_link(tmp_path: Path) -> None:
+def test_detections_relative_to_the_robot_are_in_its_base_link(tmp_path):
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
     path = people(tmp_path, "camera", [camera(Ros(2))])
 
@@ -278,7 +270,7 @@ def test_detections_relative_to_the_robot_are_in_its_base_link(tmp_path: Path) -
     np.testing.assert_allclose(log.xy, [[3.1, 0.0]], atol=1e-9)
 
 
-def test_detections_of_a_camera_without_transforms_are_refused(tmp_path: Path) -> None:
+def test_detections_of_a_camera_without_transforms_are_refused(tmp_path):
     pytest.importorskip("rosbags", reason="the extra ros is not installed")
     with pytest.raises(LogError, match="no transform leads from the frame 'camera' to 'map'"):
         read_detections(people(tmp_path, "camera", []), time_zone="UTC")

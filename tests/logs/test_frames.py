@@ -20,21 +20,21 @@ def matrices(motions: RigidMotions) -> np.ndarray:
     return whole
 
 
-def test_motions_after_each_other_are_products_of_matrices() -> None:
+def test_motions_after_each_other_are_products_of_matrices():
     first, then = drawn(1), drawn(2)
     np.testing.assert_allclose(
         matrices(then.after(first)), matrices(then) @ matrices(first), atol=1e-12
     )
 
 
-def test_a_motion_and_its_inverse_are_none() -> None:
+def test_a_motion_and_its_inverse_are_none():
     motions = drawn(3)
     whole = matrices(motions.inverse().after(motions))
     np.testing.assert_allclose(whole, np.tile(np.eye(4), (50, 1, 1)), atol=1e-12)
 
 
 @pytest.mark.parametrize("count", [2, 5])
-def test_turns_between_stamps_are_slerped_and_places_on_a_line(count: int) -> None:
+def test_turns_between_stamps_are_slerped_and_places_on_a_line(count):
     motions = drawn(count, count)
     stamps = np.arange(count) * 10**9 + 7
     link = FrameLink(False, {("map", "/tf")}, stamps.tolist(), stamps.tolist())
@@ -51,7 +51,7 @@ def test_turns_between_stamps_are_slerped_and_places_on_a_line(count: int) -> No
         np.testing.assert_allclose(at.place[:, axis], line, atol=1e-9)
 
 
-def test_nearly_equal_turns_are_interpolated_too() -> None:
+def test_nearly_equal_turns_are_interpolated_too():
     rows = [[0.0] * 6 + [1.0], [2.0, 0.0, 0.0, 0.0, 0.0, 1e-9, 1.0]]
     link = FrameLink(False, {("map", "/tf")}, [0, 10], [0, 10], rows)
 
@@ -61,6 +61,6 @@ def test_nearly_equal_turns_are_interpolated_too() -> None:
     assert np.isfinite(at.turn).all()
 
 
-def test_a_static_link_holds_at_all_times() -> None:
+def test_a_static_link_holds_at_all_times():
     link = FrameLink(True, {("map", "/tf_static")}, [5], [5], [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]])
     assert link.at(np.array([-9, 0, 9])).place[:, 0].tolist() == [1.0, 1.0, 1.0]

@@ -15,16 +15,16 @@ def labels(*at: int) -> list[str]:
     return [reading.activity for reading in readings if reading.room == "bed"]
 
 
-def test_who_gets_up_at_night_sleeps_on_afterwards() -> None:
+def test_who_gets_up_at_night_sleeps_on_afterwards():
     """In a real home 2,204 of 5,127 readings lost "sleeping", as a visit to the toilet had ended."""
     assert ["sleep", "toilet", "toilet", "sleep", "sleep", ""] == labels(0, 40, 50, 51, 100, 101)
 
 
-def test_readings_out_of_order_have_the_labels_of_their_times() -> None:
+def test_readings_out_of_order_have_the_labels_of_their_times():
     assert labels(20, 45, 60) == labels(60, 20, 45)
 
 
-def test_an_activity_that_another_outlasts_ends_beneath_it() -> None:
+def test_an_activity_that_another_outlasts_ends_beneath_it():
     cooking, eating = (
         Reading(0, 60, "kitchen", "cook", 1),
         Reading(50, 90, "kitchen", "eat", 2),
@@ -34,7 +34,7 @@ def test_an_activity_that_another_outlasts_ends_beneath_it() -> None:
     assert ["eat"] == [each.activity for each in label_by_activities([sensor], [cooking, eating])]
 
 
-def test_absences_are_readings_and_come_last_of_a_moment() -> None:
+def test_absences_are_readings_and_come_last_of_a_moment():
     door = Reading(120, 120, "hallway", "", 1)
 
     assert ["hallway", AWAY] == [each.room for each in label_by_activities([door], [OUT])]

@@ -1,6 +1,5 @@
 """Logs of all layouts: what is read, and what is refused with the line that is wrong."""
 
-from collections.abc import Callable
 from datetime import date
 from pathlib import Path
 
@@ -79,7 +78,7 @@ def position_log(*arguments: object, **settings: object) -> PositionLog:
     return log
 
 
-def test_casas_tells_an_instant_for_each_sensor_that_switches_on(tmp_path: Path) -> None:
+def test_casas_tells_an_instant_for_each_sensor_that_switches_on(tmp_path):
     log = activity_log(write(tmp_path, "events.txt", CASAS))
     assert ("casas", date(2020, 3, 2), 2) == (log.layout, log.first_day, log.days)
     assert (
@@ -90,7 +89,7 @@ def test_casas_tells_an_instant_for_each_sensor_that_switches_on(tmp_path: Path)
 
 
 @pytest.mark.parametrize("named", ["A_Sensors.txt", "A_ADLs.txt", ""])
-def test_uci_adl_joins_both_files_of_a_home_whichever_is_named(tmp_path: Path, named: str) -> None:
+def test_uci_adl_joins_both_files_of_a_home_whichever_is_named(tmp_path, named):
     write(tmp_path, "A_Sensors.txt", SENSORS)
     write(tmp_path, "A_ADLs.txt", ADLS)
     log = activity_log(tmp_path / named)
@@ -102,14 +101,12 @@ def test_uci_adl_joins_both_files_of_a_home_whichever_is_named(tmp_path: Path, n
     ] == [(r.room, r.activity, r.begin_us, r.end_us) for r in log.readings]
 
 
-def test_uci_adl_of_activities_alone_takes_them_for_rooms(tmp_path: Path) -> None:
+def test_uci_adl_of_activities_alone_takes_them_for_rooms(tmp_path):
     log = activity_log(write(tmp_path, "adl.txt", ADLS))
     assert ["Sleeping", "Breakfast", "away"] == [r.room for r in log.readings]
 
 
-def test_homer_finds_the_room_of_things_by_their_numbers_and_sleeps_into_the_next_day(
-    tmp_path: Path,
-) -> None:
+def test_homer_finds_the_room_of_things_by_their_numbers_and_sleeps_into_the_next_day(tmp_path):
     write(tmp_path, "day_000.txt", HOMER)
     write(tmp_path, "day_001.txt", HOMER)
     log = activity_log(tmp_path)
@@ -140,27 +137,25 @@ def test_homer_finds_the_room_of_things_by_their_numbers_and_sleeps_into_the_nex
         ("d.txt", HOMER.replace("### sleep-00", "### dinner-00"), "line 18: the script of dinner"),
     ],
 )  # fmt: skip
-def test_damaged_logs_are_refused_with_the_line(
-    tmp_path: Path, name: str, text: str, message: str
-) -> None:
+def test_damaged_logs_are_refused_with_the_line(tmp_path, name, text, message):
     with pytest.raises(LogError, match=message):
         read_log(write(tmp_path, name, text))
 
 
-def test_lines_that_run_backwards_are_sorted_if_asked_and_counted(tmp_path: Path) -> None:
+def test_lines_that_run_backwards_are_sorted_if_asked_and_counted(tmp_path):
     path = write(tmp_path, "a.txt", CASAS.replace("07:00:09", "06:00:09"))
     log = activity_log(path, sort=True)
     assert ["Kitchen", "Bedroom", "Kitchen"] == [r.room for r in log.readings]
     assert ("1 line ran backwards in time and were sorted in",) == log.notes
 
 
-def test_an_end_before_the_begin_leaves_an_instant_and_a_note(tmp_path: Path) -> None:
+def test_an_end_before_the_begin_leaves_an_instant_and_a_note(tmp_path):
     log = activity_log(write(tmp_path, "a_ADLs.txt", ADLS.replace("02 08:20", "01 08:20")))
     assert log.readings[1].end_us == log.readings[1].begin_us
     assert "line 4" in log.notes[0]
 
 
-def test_the_real_logs_are_read_whole(shared_data: Path) -> None:
+def test_the_real_logs_are_read_whole(shared_data):
     folder = shared_data / "activity"
     casas = activity_log(folder / "casas_al" / "events_10_days.txt")
     text = (folder / "casas_al" / "events_10_days.txt").read_text()
@@ -185,7 +180,7 @@ def csv(folder: Path, text: str) -> Path:
 TWO = "time,id,x,y,heading_deg\n2020-03-02 07:00:00,a,1,2,90\n2020-03-02 07:00:01,b,9,9,0\n2020-03-02 07:00:02,a,3,4,\n"
 
 
-def test_positions_of_one_tag_with_headings_in_degrees(tmp_path: Path) -> None:
+def test_positions_of_one_tag_with_headings_in_degrees(tmp_path):
     log = position_log(csv(tmp_path, TWO), id="a")
     assert [7 * H, 7 * H + 2 * S] == log.time_us.tolist()
     assert [[1, 2], [3, 4]] == log.xy.tolist()
@@ -218,23 +213,19 @@ def as_parquet(folder: Path) -> tuple[Path, dict[str, str]]:
 
 
 @pytest.mark.parametrize("write_it", [as_text, as_zoned_text, as_epoch_ms, as_parquet])
-def test_times_of_every_kind_become_the_same_local_times(
-    tmp_path: Path, write_it: Callable[[Path], tuple[Path, dict[str, str]]]
-) -> None:
+def test_times_of_every_kind_become_the_same_local_times(tmp_path, write_it):
     path, settings = write_it(tmp_path)
     log = position_log(path, **settings)
     assert date(2020, 3, 2) == log.first_day
     assert [7 * H, 7 * H + S // 2] == log.time_us.tolist()
 
 
-def test_numbers_of_seconds_have_no_date(tmp_path: Path) -> None:
+def test_numbers_of_seconds_have_no_date(tmp_path):
     log = position_log(csv(tmp_path, "time,x,y\n10.5,1,2\n12,1,3\n"))
     assert (None, [10_500_000, 12_000_000]) == (log.first_day, log.time_us.tolist())
 
 
-def test_summer_time_ends_the_repeated_hour_is_left_out_and_begins_with_an_hour_missing(
-    tmp_path: Path,
-) -> None:
+def test_summer_time_ends_the_repeated_hour_is_left_out_and_begins_with_an_hour_missing(tmp_path):
     autumn = [f"2020-10-25T0{h}:30:00Z,1,2" for h in range(4)]  # 02:30, 02:30 again, 03:30, 04:30
     log = position_log(csv(tmp_path, "time,x,y\n" + "\n".join(autumn)), time_zone="Europe/Berlin")
     assert [2.5, 3.5, 4.5] == (log.time_us / H).tolist()
@@ -244,7 +235,7 @@ def test_summer_time_ends_the_repeated_hour_is_left_out_and_begins_with_an_hour_
     assert [1.5, 3.5] == (log.time_us / H).tolist()
 
 
-def test_drop_outs_and_equal_times_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_drop_outs_and_equal_times_are_left_out_and_counted(tmp_path):
     log = position_log(csv(tmp_path, "time,x,y\n1,1,1\n2,,\n3,2,2\n3,4,4\n"))
     assert [[1, 1], [4, 4]] == log.xy.tolist()
     assert (
@@ -270,19 +261,17 @@ def test_drop_outs_and_equal_times_are_left_out_and_counted(tmp_path: Path) -> N
         ("time,x,y\n2020-03-02T06:00:00Z,1,2\n", {"time_zone": "Europe/Berlln"}, "did you mean 'Europe/Berlin'"),
     ],
 )  # fmt: skip
-def test_damaged_positions_are_refused_with_what_to_do(
-    tmp_path: Path, text: str, settings: dict[str, object], message: str
-) -> None:
+def test_damaged_positions_are_refused_with_what_to_do(tmp_path, text, settings, message):
     with pytest.raises(LogError, match=message):
         position_log(csv(tmp_path, text), **settings)
 
 
-def test_settings_of_positions_are_refused_for_other_layouts(tmp_path: Path) -> None:
+def test_settings_of_positions_are_refused_for_other_layouts(tmp_path):
     with pytest.raises(LogError, match="takes no time_zone: that is for positions"):
         read_log(write(tmp_path, "a.txt", CASAS), time_zone="UTC")
 
 
-def test_a_csv_written_by_arrow_reads_back(tmp_path: Path) -> None:
+def test_a_csv_written_by_arrow_reads_back(tmp_path):
     times = pa.array([1583132400 * S, 1583132401 * S], pa.timestamp("us"))
     pacsv.write_csv(pa.table({"time": times, "x": [1.5, 2.5], "y": [0, 1]}), tmp_path / "a.csv")
     log = position_log(tmp_path / "a.csv")

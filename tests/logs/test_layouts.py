@@ -273,7 +273,7 @@ def at(log: ActivityLog, second: int) -> tuple[str, str]:
 
 @pytest.mark.parametrize("name", LAYOUTS)
 @pytest.mark.parametrize("seed", some(range(3), 2))
-def test_rooms_stays_and_activities_equal_the_truth(name: str, seed: int, tmp_path: Path) -> None:
+def test_rooms_stays_and_activities_equal_the_truth(name, seed, tmp_path):
     write, keys = LAYOUTS[name]
     stays = lives(seed)
     log = read_log(write(stays, tmp_path), **keys)
@@ -293,7 +293,7 @@ def test_rooms_stays_and_activities_equal_the_truth(name: str, seed: int, tmp_pa
             assert activity == doing
 
 
-def test_the_area_of_an_entity_is_its_room_and_one_without_keeps_its_name(tmp_path: Path) -> None:
+def test_the_area_of_an_entity_is_its_room_and_one_without_keeps_its_name(tmp_path):
     lines = [
         "entity_id,area,state,last_changed",
         "binary_sensor.0x00158d,Kitchen,on,2026-03-02 08:00:00",
@@ -309,7 +309,7 @@ def test_the_area_of_an_entity_is_its_room_and_one_without_keeps_its_name(tmp_pa
     }
 
 
-def test_layouts_are_recognized_by_content_and_folders_by_their_files(tmp_path: Path) -> None:
+def test_layouts_are_recognized_by_content_and_folders_by_their_files(tmp_path):
     for name in ("kasteren", "mit", "aras"):
         folder = tmp_path / name
         folder.mkdir()
@@ -318,7 +318,7 @@ def test_layouts_are_recognized_by_content_and_folders_by_their_files(tmp_path: 
         assert read_log(folder, **keys).layout == name
 
 
-def test_an_end_before_its_beginning_is_told_of_sensors_and_activities(tmp_path: Path) -> None:
+def test_an_end_before_its_beginning_is_told_of_sensors_and_activities(tmp_path):
     """It was taken for an instant without a note."""
     begin, end = "02-Mar-2026 08:00:00", "02-Mar-2026 07:00:00"
     for kind in ("ss", "as"):
@@ -332,7 +332,7 @@ def test_an_end_before_its_beginning_is_told_of_sensors_and_activities(tmp_path:
     assert {(r.begin_us, r.end_us) for r in log.readings} == {(8 * 3600 * S, 8 * 3600 * S)}
 
 
-def test_a_number_with_two_names_is_refused(tmp_path: Path) -> None:
+def test_a_number_with_two_names_is_refused(tmp_path):
     row = "02-Mar-2026 08:00:00\t02-Mar-2026 09:00:00\t1"
     path = written(tmp_path / "kast_houseB-ss.txt", [row])
     written(tmp_path / "kast_sensorMapB.txt", ["1,Fridge,x", "2,Door,x", "1,Fridge,y", "1,Bath,x"])
@@ -341,7 +341,7 @@ def test_a_number_with_two_names_is_refused(tmp_path: Path) -> None:
         read_log(path)
 
 
-def test_an_absence_of_days_is_normal(tmp_path: Path) -> None:
+def test_an_absence_of_days_is_normal(tmp_path):
     lines = ["02-Mar-2026 08:00:00\t06-Mar-2026 20:00:00\t1"]
     written(tmp_path / "kast_actionMapB.txt", ["1,leave-house"])
     log = read_log(written(tmp_path / "kast_houseB-as.txt", lines))
@@ -380,9 +380,7 @@ def test_an_absence_of_days_is_normal(tmp_path: Path) -> None:
         ),
     ],
 )  # fmt: skip
-def test_a_damaged_log_is_refused_with_the_line(
-    tmp_path: Path, name: str, line: str, message: str
-) -> None:
+def test_a_damaged_log_is_refused_with_the_line(tmp_path, name, line, message):
     keys = {"id": "1"} if "28 1" in line else {}
     if name.endswith(".json"):
         keys = {"time_zone": "UTC"}
@@ -390,7 +388,7 @@ def test_a_damaged_log_is_refused_with_the_line(
         read_log(written(tmp_path / name, line.split("\n")), **keys)
 
 
-def test_two_residents_are_chosen_by_id(tmp_path: Path) -> None:
+def test_two_residents_are_chosen_by_id(tmp_path):
     aras(lives(1), tmp_path)
     with pytest.raises(LogError, match="two people live there"):
         read_log(tmp_path)
@@ -399,9 +397,7 @@ def test_two_residents_are_chosen_by_id(tmp_path: Path) -> None:
     assert set(other.rooms) == {"Changing Clothes"}
 
 
-def test_local_times_of_a_history_follow_the_time_zone_through_the_end_of_summer(
-    tmp_path: Path,
-) -> None:
+def test_local_times_of_a_history_follow_the_time_zone_through_the_end_of_summer(tmp_path):
     states = [
         {"entity_id": "binary_sensor.hall", "state": state, "last_changed": time}
         for state, time in [
@@ -418,7 +414,7 @@ def test_local_times_of_a_history_follow_the_time_zone_through_the_end_of_summer
     assert log.notes == ("left out as unavailable or unknown: 2 states",)
 
 
-def test_a_database_of_something_else_is_refused(tmp_path: Path) -> None:
+def test_a_database_of_something_else_is_refused(tmp_path):
     """A view could be any query: this one never ends."""
     endless = "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n)"
     for number, statement in enumerate(
@@ -452,14 +448,14 @@ def test_a_database_of_something_else_is_refused(tmp_path: Path) -> None:
         ("Washing machine", "laundry"),
     ],
 )
-def test_labels_are_taken_for_the_rooms_that_their_words_name(label: str, room: str) -> None:
+def test_labels_are_taken_for_the_rooms_that_their_words_name(label, room):
     rooms = fleet2d.load_floorplan().rooms
     (choice,) = map_rooms({label: 1}, {}, rooms)[label] or ("none",)
     assert choice.startswith(room)
 
 
 @pytest.mark.parametrize("label", ["M003", "door", "sensor.x"])
-def test_labels_without_such_words_are_asked_for(label: str) -> None:
+def test_labels_without_such_words_are_asked_for(label):
     rooms = fleet2d.load_floorplan().rooms
     if label == "door":
         assert map_rooms({label: 1}, {}, rooms)[label] == ("door",)
@@ -469,9 +465,7 @@ def test_labels_without_such_words_are_asked_for(label: str) -> None:
 
 
 @pytest.mark.parametrize(("home", "days", "absences"), [("A", 28, 33), ("C", 20, 47)])
-def test_real_homes_of_kasteren_are_read_whole(
-    shared_data: Path, home: str, days: int, absences: int
-) -> None:
+def test_real_homes_of_kasteren_are_read_whole(shared_data, home, days, absences):
     log = read_log(shared_data / "activity" / "kasteren" / f"kast_house{home}-ss.txt")
     assert isinstance(log, ActivityLog)
     assert (log.days, log.rooms[AWAY]) == (days, absences)

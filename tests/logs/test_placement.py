@@ -28,8 +28,8 @@ def named_room(kind: str, *functions: str) -> Any:
     origin=st.tuples(NUMBER, NUMBER),
 )
 def test_a_frame_does_what_complex_numbers_do_and_matches_find_it_again(
-    scale: float, degrees: float, flip: bool, origin: tuple[float, float]
-) -> None:
+    scale, degrees, flip, origin
+):
     frame = LogFrame(scale=scale, rotation_deg=degrees, flip_y=flip, origin=origin)
     log = np.array([[0.0, 0.0], [10.0, 0.0], [3.0, 7.0]])
     z = log[:, 0] + 1j * (-log[:, 1] if flip else log[:, 1])
@@ -42,7 +42,7 @@ def test_a_frame_does_what_complex_numbers_do_and_matches_find_it_again(
     assert fitted.errors().max() < 1e-6 * (1 + scale)
 
 
-def test_headings_turn_and_mirror_with_the_frame() -> None:
+def test_headings_turn_and_mirror_with_the_frame():
     east, north = 0.0, 0.25
     turned = LogFrame(rotation_deg=90).turn_headings(np.array([east, north]))
     assert [0.25, 0.5] == pytest.approx(turned.tolist())
@@ -58,9 +58,7 @@ def test_headings_turn_and_mirror_with_the_frame() -> None:
         ({"scale": 0}, "greater than 0"),
     ],
 )
-def test_a_frame_that_says_too_much_or_too_little_is_refused(
-    settings: dict[str, object], message: str
-) -> None:
+def test_a_frame_that_says_too_much_or_too_little_is_refused(settings, message):
     with pytest.raises(ValidationError, match=message):
         LogFrame.model_validate(settings)
 
@@ -75,21 +73,19 @@ def test_a_frame_that_says_too_much_or_too_little_is_refused(
         ("Sauna", ["garage", "living_room"], "living_room"),
     ],
 )
-def test_a_label_without_its_room_proposes_the_most_similar_one(
-    label: str, kinds: list[str], proposal: str
-) -> None:
+def test_a_label_without_its_room_proposes_the_most_similar_one(label, kinds, proposal):
     rooms = [named_room(kind) for kind in kinds]
     with pytest.raises(LogError, match=rf"rooms: {{{label}: {proposal}}}, or another: "):
         map_rooms({label: 3}, {}, rooms)
 
 
-def test_a_label_means_the_first_of_its_rooms_that_the_home_has() -> None:
+def test_a_label_means_the_first_of_its_rooms_that_the_home_has():
     rooms = [named_room("toilet")]
     known = map_rooms({"Sink": 3, "Sofa": 1}, {"Sink": ("bathroom", "toilet"), "Sofa": None}, rooms)
     assert known == {"Sink": ("toilet",), "Sofa": None}
 
 
-def test_a_kitchenette_in_the_living_room_is_the_kitchen_of_a_log() -> None:
+def test_a_kitchenette_in_the_living_room_is_the_kitchen_of_a_log():
     # `examples/transfer/presence.yaml` couldn't be run: its first home has no other kitchen.
     rooms = [named_room("living_room", "kitchen"), named_room("bedroom")]
 

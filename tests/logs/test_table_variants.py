@@ -173,7 +173,7 @@ def verdict(variant: Variant) -> str:
 @pytest.mark.parametrize(
     ("first", "count"), [(0, 25), pytest.param(1000, 500, marks=pytest.mark.slow)]
 )
-def test_no_spelling_of_a_log_is_silently_wrong(tmp_path: Path, first: int, count: int) -> None:
+def test_no_spelling_of_a_log_is_silently_wrong(tmp_path, first, count):
     verdicts = {}
     for seed in range(first, first + count):
         folder = tmp_path / str(seed)

@@ -47,18 +47,18 @@ def moments(log: PositionLog) -> list[datetime]:
 @pytest.mark.parametrize(
     ("tag", "x"), [("007", [9.0, 9.1, 9.2]), ("7", [12.0, 12.1])], ids=["007", "7"]
 )
-def test_a_leading_zero_makes_another_tag(tmp_path: Path, tag: str, x: list[float]) -> None:
+def test_a_leading_zero_makes_another_tag(tmp_path, tag, x):
     log = positions(csv(tmp_path, TAGS), id=tag)
 
     assert log.xy[:, 0].tolist() == x
 
 
-def test_tags_that_are_one_number_are_several(tmp_path: Path) -> None:
+def test_tags_that_are_one_number_are_several(tmp_path):
     with pytest.raises(LogError, match="holds 2 ids: 007, 7: select one by 'id'"):
         read_log(csv(tmp_path, TAGS))
 
 
-def test_hexadecimal_tags_are_named_as_in_the_file(tmp_path: Path) -> None:
+def test_hexadecimal_tags_are_named_as_in_the_file(tmp_path):
     path = csv(tmp_path, TAGS.replace(",007,", ",0x6733,").replace(",7,", ",0x6734,"))
 
     assert positions(path, id="0x6733").xy[:, 0].tolist() == [9.0, 9.1, 9.2]
@@ -69,7 +69,7 @@ def test_hexadecimal_tags_are_named_as_in_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("ids", "tag"), [([7, 7, 8], "7"), (["007", "007", "7"], "007"), ([True, True, False], "true")]
 )
-def test_ids_of_typed_tables_are_their_text(tmp_path: Path, ids: list[Any], tag: str) -> None:
+def test_ids_of_typed_tables_are_their_text(tmp_path, ids, tag):
     columns: dict[str, list[Any]] = {"time": [1, 2, 3], "id": ids, "x": [1.0, 2.0, 3.0]}
     columns["y"] = columns["x"]
     parquet, lines = tmp_path / "a.parquet", tmp_path / "a.jsonl"
@@ -81,7 +81,7 @@ def test_ids_of_typed_tables_are_their_text(tmp_path: Path, ids: list[Any], tag:
         assert positions(path, id=tag).xy[:, 0].tolist() == [1.0, 2.0]
 
 
-def test_ids_that_a_program_made_fractions_are_refused(tmp_path: Path) -> None:
+def test_ids_that_a_program_made_fractions_are_refused(tmp_path):
     path = tmp_path / "a.parquet"
     pq.write_table(pa.table({"time": [1], "id": [7.0], "x": [1.0], "y": [1.0]}), path)
 
@@ -90,7 +90,7 @@ def test_ids_that_a_program_made_fractions_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["7", "007", "0x10", "1e3", "true"])
-def test_an_id_in_yaml_without_quotes_is_refused(tmp_path: Path, text: str) -> None:
+def test_an_id_in_yaml_without_quotes_is_refused(tmp_path, text):
     csv(tmp_path, TAGS)
     scenario = csv(
         tmp_path,
@@ -122,9 +122,7 @@ def test_an_id_in_yaml_without_quotes_is_refused(tmp_path: Path, text: str) -> N
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
-def test_every_dialect_has_the_same_fixes(
-    tmp_path: Path, name: str, text: str, settings: dict[str, Any], encoding: str
-) -> None:
+def test_every_dialect_has_the_same_fixes(tmp_path, name, text, settings, encoding):
     log = positions(csv(tmp_path, text.replace("\n", "\r\n"), encoding), **settings)
 
     assert moments(log) == [MARCH, MARCH + timedelta(seconds=1)], name
@@ -132,7 +130,7 @@ def test_every_dialect_has_the_same_fixes(
     assert np.allclose(plan, [[1.5, 2.0], [2.25, 3.0]], atol=1e-9)
 
 
-def test_a_day_above_twelve_decides_the_order_of_all_dates(tmp_path: Path) -> None:
+def test_a_day_above_twelve_decides_the_order_of_all_dates(tmp_path):
     text = "time,x,y\n12/03/2026 08:00,1,2\n13/03/2026 08:00,1,3\n"
 
     log = positions(csv(tmp_path, text))
@@ -141,13 +139,13 @@ def test_a_day_above_twelve_decides_the_order_of_all_dates(tmp_path: Path) -> No
     assert moments(log)[0].month == 3
 
 
-def test_seconds_count_in_the_unit_that_the_column_names(tmp_path: Path) -> None:
+def test_seconds_count_in_the_unit_that_the_column_names(tmp_path):
     log = positions(csv(tmp_path, "time_ms,x,y\n1500,1,2\n3000,1,3\n"))
 
     assert log.time_us.tolist() == [1_500_000, 3_000_000]
 
 
-def test_headings_in_radians_or_degrees_as_the_column_names(tmp_path: Path) -> None:
+def test_headings_in_radians_or_degrees_as_the_column_names(tmp_path):
     head = "time,x,y,heading"
     degrees = positions(csv(tmp_path, f"{head} [deg]\n1,1,2,90\n"))
     radians = positions(csv(tmp_path, f"{head}\n1,1,2,1.5\n"))
@@ -180,19 +178,17 @@ def test_headings_in_radians_or_degrees_as_the_column_names(tmp_path: Path) -> N
         ('time,note,x,y\n1,"a\nb",2,3\n\n2,c,two,3\n', "line 5: expected a number in column 'x'"),
     ],
 )  # fmt: skip
-def test_what_may_mean_two_things_is_refused_with_the_key(
-    tmp_path: Path, text: str, message: str
-) -> None:
+def test_what_may_mean_two_things_is_refused_with_the_key(tmp_path, text, message):
     with pytest.raises(LogError, match=message):
         read_log(csv(tmp_path, text))
 
 
-def test_text_that_is_not_unicode_is_refused(tmp_path: Path) -> None:
+def test_text_that_is_not_unicode_is_refused(tmp_path):
     with pytest.raises(LogError, match="not text in UTF-8: save it as CSV in UTF-8"):
         read_log(csv(tmp_path, "time,x,y,Größe\n1,2,3,4\n", "cp1252"))
 
 
-def test_the_key_decides_on_commas_of_three_digits(tmp_path: Path) -> None:
+def test_the_key_decides_on_commas_of_three_digits(tmp_path):
     path = csv(tmp_path, "time;x;y\n1;9,000;4,125\n")
 
     assert positions(path, decimal_comma=True).xy.tolist() == [[9.0, 4.125]]
@@ -200,7 +196,7 @@ def test_the_key_decides_on_commas_of_three_digits(tmp_path: Path) -> None:
         read_log(path, decimal_comma=False)
 
 
-def test_a_scale_that_contradicts_the_columns_is_refused(tmp_path: Path) -> None:
+def test_a_scale_that_contradicts_the_columns_is_refused(tmp_path):
     log = positions(csv(tmp_path, "time,x [mm],y [mm]\n1,1,2\n"))
 
     with pytest.raises(
@@ -209,7 +205,7 @@ def test_a_scale_that_contradicts_the_columns_is_refused(tmp_path: Path) -> None
         LogFrame(scale=0.01).in_unit(log.unit_m)
 
 
-def test_all_tags_of_a_file_begin_with_the_same_day(tmp_path: Path) -> None:
+def test_all_tags_of_a_file_begin_with_the_same_day(tmp_path):
     text = "time,id,x,y\n2026-01-05 08:00,a,1,2\n2026-01-06 08:00,b,1,2\n"
 
     log = positions(csv(tmp_path, text), id="b")

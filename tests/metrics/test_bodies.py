@@ -5,7 +5,7 @@ import numpy as np
 import fleet2d
 
 
-def test_stays_cover_the_run_and_agree_with_the_trajectory() -> None:
+def test_stays_cover_the_run_and_agree_with_the_trajectory():
     run = fleet2d.run(
         "bundled:paper", "simulation.duration=30 h", metrics={"stays": {"period": "7 h"}}, seed=3
     )
@@ -23,7 +23,7 @@ def test_stays_cover_the_run_and_agree_with_the_trajectory() -> None:
     assert {"away", "bedroom_1"} <= set(places)
 
 
-def test_without_users_there_is_no_table() -> None:
+def test_without_users_there_is_no_table():
     run = fleet2d.run(
         "bundled:paper",
         "simulation.duration=1 h",

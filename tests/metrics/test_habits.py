@@ -10,12 +10,12 @@ AT_HOME, AWAY = [0.6, 0.3, 0.1], [0.1, 0.1, 0.8]
 WEEK = np.array([AT_HOME, AWAY, AT_HOME, AWAY])
 
 
-def test_the_truth_itself_answers_all_questions_rightly() -> None:
+def test_the_truth_itself_answers_all_questions_rightly():
     right = {"home": 1, "always_home": 0.5, "away_f1": 1, "place": 1, "probability": 0}
     assert answer_scores(WEEK, WEEK) == right
 
 
-def test_a_belief_that_is_the_same_at_all_hours_finds_no_hour_away() -> None:
+def test_a_belief_that_is_the_same_at_all_hours_finds_no_hour_away():
     scores = answer_scores(WEEK, np.array([AT_HOME] * 4))
 
     assert scores["home"] == scores["always_home"] == scores["place"] == 0.5
@@ -23,12 +23,12 @@ def test_a_belief_that_is_the_same_at_all_hours_finds_no_hour_away() -> None:
     assert scores["probability"] == pytest.approx(0.35)
 
 
-def test_a_place_as_frequent_as_the_most_frequent_one_is_right() -> None:
+def test_a_place_as_frequent_as_the_most_frequent_one_is_right():
     truth = np.array([[0.5, 0.5, 0.0]])
     assert answer_scores(truth, np.array([[0.1, 0.9, 0.0]]))["place"] == 1
 
 
-def test_a_person_with_hours_is_told_by_the_hour_and_not_overall() -> None:
+def test_a_person_with_hours_is_told_by_the_hour_and_not_overall():
     """Away from nine to five on each of eight days, seen by rounds in a home of two rooms."""
     items = [
         {"at": "00:00", "place": "bedroom"},

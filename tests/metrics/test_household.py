@@ -99,9 +99,7 @@ def twin(stored: Run) -> dict[str, float]:
         ([ASKS, {"type": "patrol"}], {"pill": PILL}, ["value", "bother", "unvisited_h"]),
     ],
 )
-def test_terms_are_those_of_the_tables(
-    behaviors: list[Any], interactions: dict[str, Any], counted: list[str]
-) -> None:
+def test_terms_are_those_of_the_tables(behaviors, interactions, counted):
     stored = run(home(behaviors, interactions=interactions))
     terms = stored.metrics["household"]["astro"]
 
@@ -109,7 +107,7 @@ def test_terms_are_those_of_the_tables(
     assert all(terms[name] > 0 for name in counted)
 
 
-def test_terms_are_the_same_however_the_run_is_cut() -> None:
+def test_terms_are_the_same_however_the_run_is_cut():
     content = home([FIND, HANGOUT])
     whole = run(content).metrics["household"]
     simulation = Simulation(content)
@@ -122,7 +120,7 @@ def test_terms_are_the_same_however_the_run_is_cut() -> None:
     assert whole == simulation.finish().metrics["household"]
 
 
-def test_sleepers_and_people_in_bathrooms_are_disturbed_and_never_near() -> None:
+def test_sleepers_and_people_in_bathrooms_are_disturbed_and_never_near():
     for place, activity in (("living_room", "sleep"), ([7.0, 6.0], "read")):
         items = [{"at": "00:00", "place": place, "activity": activity}]
         ana = {"type": "schedule", "days": [{"items": items}], "start": place}
@@ -133,7 +131,7 @@ def test_sleepers_and_people_in_bathrooms_are_disturbed_and_never_near() -> None
         assert (0, 60) == (terms["near_min"], round(terms["disturbing_min"]))
 
 
-def test_resting_begins_a_minute_after_the_last_move() -> None:
+def test_resting_begins_a_minute_after_the_last_move():
     items = [{"at": "00:00", "place": "living_room", "activity": "read"}]
     ana = {"type": "schedule", "days": [{"items": items}], "start": "living_room"}
     astro = {"start": "living_room", "behaviors": []}
@@ -146,11 +144,11 @@ def test_resting_begins_a_minute_after_the_last_move() -> None:
     ("activity", "expected"),
     [("tv", True), ("cook", True), ("care", True), ("study", False), ("shower", False)],
 )
-def test_who_is_busy_has_no_time(activity: str, expected: bool) -> None:
+def test_who_is_busy_has_no_time(activity, expected):
     assert expected == has_time(activity)
 
 
-def test_two_robots_are_counted_each() -> None:
+def test_two_robots_are_counted_each():
     content = home([HANGOUT])
     content["robots"]["rosie"] = {**content["robots"]["astro"], "start": "kitchen"}
 

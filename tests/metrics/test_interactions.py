@@ -17,7 +17,7 @@ def measured(**changes: Any) -> tuple[dict[str, Any], fleet2d.Run]:
     return run.metrics["interactions"]["astro"]["ana"], run
 
 
-def test_what_is_accepted_counts_with_its_value_then() -> None:
+def test_what_is_accepted_counts_with_its_value_then():
     pill = PILL | {"falls_to": 0.5}
     numbers, run = measured(interactions={"pill": pill})
 
@@ -29,7 +29,7 @@ def test_what_is_accepted_counts_with_its_value_then() -> None:
     assert 5.0 == numbers["wait_s"]
 
 
-def test_what_is_declined_is_answered_and_missed() -> None:
+def test_what_is_declined_is_answered_and_missed():
     numbers, _ = measured(users={"ana": ana(outcomes=("declined",))})
 
     assert {"answered": 1.0, "accepted": 0.0, "kept": 0.0, "value": 0.0, "missed": 4.0} == {
@@ -38,19 +38,19 @@ def test_what_is_declined_is_answered_and_missed() -> None:
 
 
 @pytest.mark.parametrize("outcome", ["sent_away", "banned", "switched_off"])
-def test_being_sent_away_is_no_answer(outcome: str) -> None:
+def test_being_sent_away_is_no_answer(outcome):
     numbers, _ = measured(users={"ana": ana("bedroom", (outcome,))})
 
     assert (0.0, 1) == (numbers["answered"], numbers[outcome])
 
 
-def test_who_is_not_reached_is_missed() -> None:
+def test_who_is_not_reached_is_missed():
     numbers, _ = measured(robots={"astro": {"behaviors": [{"type": "interact", "seek": False}]}})
 
     assert (1, 0, 4.0) == (numbers["wanted"], numbers["asked"], numbers["missed"])
 
 
-def test_bad_times_count_by_activity_and_annoy() -> None:
+def test_bad_times_count_by_activity_and_annoy():
     person = ana(outcomes=("ignored",))
     numbers, run = measured(users={"ana": person})
     assert {} == numbers["interrupted"]  # at even odds of being available
@@ -65,7 +65,7 @@ def test_bad_times_count_by_activity_and_annoy() -> None:
     assert rows["willingness"].max() < 0.1
 
 
-def test_annoyance_and_burden_fade_between_the_prompts_of_a_run() -> None:
+def test_annoyance_and_burden_fade_between_the_prompts_of_a_run():
     months = {"type": "fading", "annoyed_by": 1, "annoyance_lasts": "30 min"}
     person = ana() | {"answers": Scripted(outcomes=("accepted",), months=months)}
     pill = PILL | {"at": [], "every": "1 h", "within": "50 min"}
@@ -78,7 +78,7 @@ def test_annoyance_and_burden_fade_between_the_prompts_of_a_run() -> None:
     assert [1 / 7, (1 + np.exp(-hours / 168)) / 7] == pytest.approx(rows["burden"].tolist())
 
 
-def test_waking_somebody_is_counted() -> None:
+def test_waking_somebody_is_counted():
     days = [{"on": "daily", "items": [{"at": "07:02", "place": "bedroom", "activity": "sleep"}]}]
     person = ana() | {"days": days, "answers": {"notice": {"base": 20}}}
     numbers, _ = measured(users={"ana": person})
@@ -87,7 +87,7 @@ def test_waking_somebody_is_counted() -> None:
     assert {"sleep": 1} == numbers["interrupted"]
 
 
-def test_algorithms_cannot_read_answers() -> None:
+def test_algorithms_cannot_read_answers():
     from fleet2d import Algorithm
     from fleet2d.errors import ComponentError
 

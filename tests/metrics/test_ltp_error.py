@@ -49,12 +49,12 @@ def two(draw) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(st.floats(1e-300, 1e300))
-def test_logarithms_equal_the_library_to_the_last_digits(x: float) -> None:
+def test_logarithms_equal_the_library_to_the_last_digits(x):
     assert math.log(x) == pytest.approx(float(natural_log(x)), rel=1e-15, abs=1e-15)
 
 
 @given(two())
-def test_distances_are_their_definitions(pair) -> None:
+def test_distances_are_their_definitions(pair):
     p, q = pair
     assert sum(abs(a - b) for a, b in zip(p, q, strict=True)) / 2 == pytest.approx(
         total_variation(p, q)
@@ -69,7 +69,7 @@ def test_distances_are_their_definitions(pair) -> None:
 
 
 @given(two())
-def test_distances_are_zero_of_the_same_and_bounded(pair) -> None:
+def test_distances_are_zero_of_the_same_and_bounded(pair):
     p, q = pair
     for distance in (total_variation, jensen_shannon):
         assert 0 == pytest.approx(distance(p, p), abs=1e-12)
@@ -79,7 +79,7 @@ def test_distances_are_zero_of_the_same_and_bounded(pair) -> None:
     assert room_gaps(p, q).max() <= total_variation(p, q) + 1e-12
 
 
-def test_distances_go_along_the_last_axis() -> None:
+def test_distances_go_along_the_last_axis():
     p, q = np.random.default_rng(1).dirichlet(np.ones(4), (2, 5))
     for distance in (total_variation, jensen_shannon, kl_divergence, rank_correlation):
         expected = [float(distance(a, b)) for a, b in zip(p, q, strict=True)]
@@ -97,14 +97,14 @@ def transport(draw) -> tuple[list[int], list[int], np.ndarray]:
 
 
 @given(transport())
-def test_earth_mover_is_the_cheapest_of_all_assignments(case) -> None:
+def test_earth_mover_is_the_cheapest_of_all_assignments(case):
     here, there, cost = case
     expected = slow.earth_mover(there.tolist(), here.tolist(), cost)
     assert expected == pytest.approx(earth_mover(there / 6, here / 6, cost), abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_earth_mover_is_the_cheapest_of_all_flows(seed: int) -> None:
+def test_earth_mover_is_the_cheapest_of_all_flows(seed):
     """Shares of any size in up to nine rooms; the twin takes out dearer circles."""
     random = np.random.default_rng(seed)
     rooms = int(random.integers(2, 10))
@@ -118,14 +118,14 @@ def test_earth_mover_is_the_cheapest_of_all_flows(seed: int) -> None:
     )
 
 
-def test_earth_mover_undoes_a_flow_where_that_is_cheaper() -> None:
+def test_earth_mover_undoes_a_flow_where_that_is_cheaper():
     """The nearest pair first would cost 1 + 9; crossing over costs 2 + 2."""
     cost = np.array([[0.0, 9, 1, 2], [9, 0, 2, 9], [1, 2, 0, 9], [2, 9, 9, 0]])
     truth, estimate = np.array([0, 0, 0.5, 0.5]), np.array([0.5, 0.5, 0, 0])
     assert 2.0 == pytest.approx(earth_mover(truth, estimate, cost))
 
 
-def test_order_of_rooms_is_compared_pair_by_pair() -> None:
+def test_order_of_rooms_is_compared_pair_by_pair():
     p = np.array([0.4, 0.3, 0.2, 0.1])
     assert 1.0 == rank_correlation(p, p)
     assert -1.0 == rank_correlation(p, p[::-1])
@@ -134,7 +134,7 @@ def test_order_of_rooms_is_compared_pair_by_pair() -> None:
 
 
 @given(st.integers(0, 10_000), st.integers(1, 40), st.integers(1, 6), st.integers(1, 20))
-def test_scores_are_their_definitions(seed: int, count: int, places: int, masses: int) -> None:
+def test_scores_are_their_definitions(seed, count, places, masses):
     random = np.random.default_rng(seed)
     p, truth = random.dirichlet(np.ones(places), count), random.integers(0, places, count)
     assert [slow.brier(row, t) for row, t in zip(p, truth, strict=True)] == pytest.approx(
@@ -169,7 +169,7 @@ def coarse(draw) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(coarse(), st.integers(1, 4), st.integers(1, 9))
-def test_ties_are_shared_and_stay_together(case, k: int, masses: int) -> None:
+def test_ties_are_shared_and_stay_together(case, k, masses):
     p, truth = case
     expected = [slow.among_best(row, t, k) for row, t in zip(p.tolist(), truth, strict=True)]
     assert expected == pytest.approx(top_k(p, truth, k).tolist())
@@ -188,7 +188,7 @@ def test_ties_are_shared_and_stay_together(case, k: int, masses: int) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), min_size=1, max_size=40))
-def test_parts_of_the_brier_score_equal_those_by_forecast(rows) -> None:
+def test_parts_of_the_brier_score_equal_those_by_forecast(rows):
     """Three forecasts, which many groups tell apart however often each was made."""
     said = np.array([[0.2, 0.3, 0.5], [0.4, 0.4, 0.2], [0.9, 0.1, 0.0]])
     p, truth = said[[kind for kind, _ in rows]], np.array([t for _, t in rows])
@@ -197,12 +197,12 @@ def test_parts_of_the_brier_score_equal_those_by_forecast(rows) -> None:
 
 
 @given(two())
-def test_order_of_rooms_equals_pairs(pair) -> None:
+def test_order_of_rooms_equals_pairs(pair):
     p, q = pair
     assert slow.kendall(p.tolist(), q.tolist()) == pytest.approx(float(rank_correlation(p, q)))
 
 
-def test_forecasts_that_are_right_at_their_rates_are_calibrated() -> None:
+def test_forecasts_that_are_right_at_their_rates_are_calibrated():
     """20,000 forecasts in 15 groups: each gap has a standard error of 0.014 at most."""
     random = np.random.default_rng(3)
     p = random.dirichlet(np.ones(4), 20_000)
@@ -211,7 +211,7 @@ def test_forecasts_that_are_right_at_their_rates_are_calibrated() -> None:
     assert calibration_error(np.eye(4)[p.argmax(axis=1)], truth) > 0.3
 
 
-def test_scores_of_no_forecasts_and_of_impossible_ones() -> None:
+def test_scores_of_no_forecasts_and_of_impossible_ones():
     assert 0.0 == calibration_error(np.zeros((0, 3)), np.zeros(0, np.int64))
     assert math.log(1e6) == pytest.approx(log_loss(np.array([[1.0, 0.0]]), np.array([1]))[0])
     assert 0.0 == skill(1.0, 0.0)
@@ -253,9 +253,7 @@ zones = st.sampled_from(["", "Europe/Berlin", "Australia/Lord_Howe", "America/St
 
 
 @given(st.lists(rooms_of_user, max_size=4), st.integers(0, 7 * 24 * 60), st.integers(0, 99), zones)
-def test_steps_are_counted_by_place_and_hour(
-    users: list[list[int]], minute: int, first: int, zone: str
-) -> None:
+def test_steps_are_counted_by_place_and_hour(users, minute, first, zone):
     """As they are one by one, in runs that begin at any minute of a week, also as clocks change."""
     names = tuple(map(str, range(len(users))))
     home = SimpleNamespace(rooms=range(ROOMS))
@@ -279,7 +277,7 @@ def test_steps_are_counted_by_place_and_hour(
     assert expected.sum(axis=0).tolist() == steps_in_places(history, state).tolist()
 
 
-def test_counts_of_many_users_take_memory_in_proportion() -> None:
+def test_counts_of_many_users_take_memory_in_proportion():
     rng = np.random.default_rng(0)
     users = rng.integers(-1, ROOMS, (500, STEPS)).tolist()
     home = SimpleNamespace(rooms=range(ROOMS))

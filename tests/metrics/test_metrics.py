@@ -28,7 +28,7 @@ def content(period: str = "17 min") -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def stored() -> Run:
+def stored():
     """A run with metrics whose period does not divide it."""
     return run(content())
 
@@ -42,7 +42,7 @@ def rows(stored: Run, entity: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("user", ["ana", "ben", "gone"])
-def test_room_share_is_the_share_of_steps_in_each_room(stored: Run, user: str) -> None:
+def test_room_share_is_the_share_of_steps_in_each_room(stored, user):
     counts: dict[str, int] = {}
     for row in rows(stored, user):
         room = "away" if row["away"] else row["room"]
@@ -52,7 +52,7 @@ def test_room_share_is_the_share_of_steps_in_each_room(stored: Run, user: str) -
     }
 
 
-def test_room_share_per_period_is_stored(stored: Run) -> None:
+def test_room_share_per_period_is_stored(stored):
     shares = table(stored, "room_share")
     ends = [*range(1020, 6000, 1020), 6000]
     assert sorted({end - 1 for end in ends}) == sorted(set(shares["step"].tolist()))
@@ -69,20 +69,20 @@ def test_room_share_per_period_is_stored(stored: Run) -> None:
 
 
 @pytest.mark.parametrize("user", ["ana", "ben"])
-def test_sightings_are_the_share_of_steps_at_home_with_a_detection(stored: Run, user: str) -> None:
+def test_sightings_are_the_share_of_steps_at_home_with_a_detection(stored, user):
     seen = set(table(stored, "observations", user=user)["step"].tolist())
     at_home = {row["step"] for row in rows(stored, user) if not row["away"]}
     assert 0 < len(seen) < len(at_home)
     assert stored.metrics["sightings"][user] == pytest.approx(len(seen) / len(at_home), rel=1e-12)
 
 
-def test_users_who_were_never_at_home_have_no_share_of_sightings(stored: Run) -> None:
+def test_users_who_were_never_at_home_have_no_share_of_sightings(stored):
     assert "gone" not in stored.metrics["sightings"]
     assert {"away": 1.0} == stored.metrics["room_share"]["gone"]
 
 
 @pytest.mark.parametrize("name", ["ana", "ben", "astro", "bolt", "gone"])
-def test_distance_is_the_sum_of_all_moves_per_day(stored: Run, name: str) -> None:
+def test_distance_is_the_sum_of_all_moves_per_day(stored, name):
     poses = path(stored, name)
     metres = 0.0
     for k in range(1, len(poses.x)):
@@ -92,20 +92,20 @@ def test_distance_is_the_sum_of_all_moves_per_day(stored: Run, name: str) -> Non
 
 
 @pytest.mark.parametrize("period", ["11 s", "1 min", "1 d"])
-def test_results_do_not_depend_on_the_period(stored: Run, period: str) -> None:
+def test_results_do_not_depend_on_the_period(stored, period):
     other = run(content(period)).metrics
     for metric, results in stored.metrics.items():
         for name, result in results.items():
             assert other[metric][name] == pytest.approx(result, rel=1e-9), (metric, name)
 
 
-def test_metrics_of_a_run_without_users_are_empty() -> None:
+def test_metrics_of_a_run_without_users_are_empty():
     metrics = {"room_share": {}, "sightings": {}}
     empty = run(scenario(robots={"astro": "patrol"}, metrics=metrics))
     assert {"room_share": {}, "sightings": {}} == empty.metrics
 
 
-def test_metrics_of_an_interrupted_run_are_of_the_simulated_steps() -> None:
+def test_metrics_of_an_interrupted_run_are_of_the_simulated_steps():
     simulation = fleet2d.Simulation(content())
     simulation.advance(90)
     metrics = simulation.finish().metrics
@@ -113,6 +113,6 @@ def test_metrics_of_an_interrupted_run_are_of_the_simulated_steps() -> None:
     assert sum(shares) == pytest.approx(1)
 
 
-def test_metrics_of_a_run_without_a_step_say_nothing() -> None:
+def test_metrics_of_a_run_without_a_step_say_nothing():
     metrics = fleet2d.Simulation(content()).finish().metrics
     assert {"room_share": {}, "sightings": {}, "distance": {}} == metrics

@@ -73,7 +73,7 @@ def estimate(stored: Any, algorithm: str, user: str, step: int) -> dict[str, flo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("user", ["ana", "ben"])
-def test_ltp_error_is_the_distance_to_the_truth(stored: Any, user: str) -> None:
+def test_ltp_error_is_the_distance_to_the_truth(stored, user):
     rows = table(stored, "error", user=user)
     for k, step in enumerate((3599, 7199, 10799)):
         lived = places(stored, user)[: step + 1]
@@ -102,7 +102,7 @@ def test_ltp_error_is_the_distance_to_the_truth(stored: Any, user: str) -> None:
     assert stored.metrics["gap"][user]["mean"] == pytest.approx(rows["mean_gap"][-1])
 
 
-def test_anyone_is_in_every_occupied_room(stored: Any) -> None:
+def test_anyone_is_in_every_occupied_room(stored):
     both = [places(stored, user) for user in USERS]
     occupied = {room: sum(room in now for now in zip(*both, strict=True)) for room in ROOMS}
     truth = {room: count / sum(occupied.values()) for room, count in occupied.items()}
@@ -111,7 +111,7 @@ def test_anyone_is_in_every_occupied_room(stored: Any) -> None:
     assert tv == pytest.approx(stored.metrics["error"]["anyone"]["tv"])
 
 
-def test_users_who_were_never_at_home_are_skipped(stored: Any) -> None:
+def test_users_who_were_never_at_home_are_skipped(stored):
     for metric in ("error", "gap"):
         assert {"ana", "ben", "anyone"} == set(stored.metrics[metric])
     assert {"ana", "ben"} == set(stored.metrics["at_home"])
@@ -119,7 +119,7 @@ def test_users_who_were_never_at_home_are_skipped(stored: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("user", ["ana", "ben", "gone"])
-def test_rtp_score_is_of_each_minute_and_by_the_gap(stored: Any, user: str) -> None:
+def test_rtp_score_is_of_each_minute_and_by_the_gap(stored, user):
     lived, observed = places(stored, user), table(stored, "observations")
     steps = observed["step"][observed["user"] == user]  # nobody is mistaken here
     rows = table(stored, "score", user=user)
@@ -150,7 +150,7 @@ def test_rtp_score_is_of_each_minute_and_by_the_gap(stored: Any, user: str) -> N
     assert right / 180 == pytest.approx(estimated["top_1"])
 
 
-def test_last_seen_is_about_the_naive_guess(stored: Any) -> None:
+def test_last_seen_is_about_the_naive_guess(stored):
     """It knows of a minute where somebody was seen most, not last."""
     scores = {user: stored.metrics["naive"][user]["all"] for user in ("ana", "ben")}
     for user in ("ana", "ben"):
@@ -171,8 +171,8 @@ def test_last_seen_is_about_the_naive_guess(stored: Any) -> None:
     ],
 )
 def test_naive_guess_of_somebody_who_was_never_seen_is_every_room_alike(
-    user: str, metric: str, log_loss: float, brier: float, top_1: float
-) -> None:
+    user, metric, log_loss, brier, top_1
+):
     blind = {"type": "patrol", "dwell": "20 s", "camera": None}
     unseen = run(
         content(
@@ -196,7 +196,7 @@ def test_naive_guess_of_somebody_who_was_never_seen_is_every_room_alike(
 
 
 @pytest.mark.parametrize("user", ["ana", "ben", "gone"])
-def test_scores_of_each_gap_are_consistent(stored: Any, user: str) -> None:
+def test_scores_of_each_gap_are_consistent(stored, user):
     for scores in stored.metrics["score"][user].values():
         parts = scores["reliability"] - scores["resolution"] + scores["uncertainty"]
         assert scores["brier"] == pytest.approx(parts)
@@ -208,7 +208,7 @@ def test_scores_of_each_gap_are_consistent(stored: Any, user: str) -> None:
         assert "reference_skill" not in scores
 
 
-def test_a_reference_is_scored_on_the_same_bins(stored: Any) -> None:
+def test_a_reference_is_scored_on_the_same_bins(stored):
     for user, by_gap in stored.metrics["beside"].items():
         for gap, scores in by_gap.items():
             other = stored.metrics["naive"][user][gap]
@@ -221,13 +221,13 @@ def test_a_reference_is_scored_on_the_same_bins(stored: Any) -> None:
             assert {k: v for k, v in scores.items() if not k.startswith("reference")} == plain
 
 
-def test_a_reference_that_is_missing_is_refused() -> None:
+def test_a_reference_that_is_missing_is_refused():
     metrics = {"score": {"type": "rtp_score", "of": "rtp", "reference": "lats"}}
     with pytest.raises(Fleet2DError, match="did you mean 'last'"):
         fleet2d.Simulation(content(metrics=metrics))
 
 
-def test_bins_without_a_reference_forecast_are_skipped() -> None:
+def test_bins_without_a_reference_forecast_are_skipped():
     """Long-term presence without a track knows nothing of the first period."""
     stored = run(
         content(
@@ -245,20 +245,20 @@ def test_bins_without_a_reference_forecast_are_skipped() -> None:
     assert scores["reference_skill"] != scores["skill"]
 
 
-def test_bins_away_do_not_count_given_home(stored: Any) -> None:
+def test_bins_away_do_not_count_given_home(stored):
     lived = places(stored, "ana")
     at_home = sum(lived[end] != "away" for end in range(59, 10800, 60))
     assert at_home == stored.metrics["at_home"]["ana"]["all"]["bins"]
 
 
-def test_metrics_change_nothing(stored: Any) -> None:
+def test_metrics_change_nothing(stored):
     without = digests(run(content(metrics={})))
     with_ = digests(stored)
     for name in ("trajectories", "observations", "ltp", "rtp"):
         assert without[name] == with_[name]
 
 
-def test_forecasts_are_used_if_an_algorithm_has_no_track() -> None:
+def test_forecasts_are_used_if_an_algorithm_has_no_track():
     stored = run(
         content(
             metrics={"score": {"type": "rtp_score", "of": "ltp", "period": "30 min"}},
@@ -269,12 +269,12 @@ def test_forecasts_are_used_if_an_algorithm_has_no_track() -> None:
     assert 150 == stored.metrics["score"]["ben"]["all"]["bins"]
 
 
-def test_another_period_than_that_of_the_track_is_refused() -> None:
+def test_another_period_than_that_of_the_track_is_refused():
     with pytest.raises(Fleet2DError, match="same period"):
         run(content(metrics={"score": {"type": "rtp_score", "of": "rtp", "period": "1 h"}}))
 
 
-def test_an_output_that_is_no_presence_is_refused() -> None:
+def test_an_output_that_is_no_presence_is_refused():
     from tests.scenes import OWN
 
     algorithms = {
@@ -290,7 +290,7 @@ def test_an_output_that_is_no_presence_is_refused() -> None:
         )
 
 
-def test_burn_in_ends_where_the_error_stays_small() -> None:
+def test_burn_in_ends_where_the_error_stays_small():
     from fleet2d.metrics.ltp_error import LtpError
 
     metric = LtpError(of="ltp")
@@ -305,7 +305,7 @@ def test_burn_in_ends_where_the_error_stays_small() -> None:
     assert "burn_in_day" not in metric.result()["ana"]
 
 
-def test_a_window_ignores_earlier_steps() -> None:
+def test_a_window_ignores_earlier_steps():
     """A person who changed rooms: the truth of the last hour is the new room alone."""
     agenda = [{"items": [{"at": "00:00", "place": "bedroom"}, {"at": "09:00", "place": "kitchen"}]}]
     settings = {"type": "ltp_gap", "of": "ltp", "period": "30 min"}
@@ -320,7 +320,7 @@ def test_a_window_ignores_earlier_steps() -> None:
     assert rows["all"]["true_share"][-1] == pytest.approx(1 / 3, abs=0.02)
 
 
-def test_hours_of_the_week_are_compared_one_by_one() -> None:
+def test_hours_of_the_week_are_compared_one_by_one():
     week = {"type": "long_term_presence", "estimator": "sighting_share", "by": "hour_of_week"}
     stored = run(
         content(
@@ -332,7 +332,7 @@ def test_hours_of_the_week_are_compared_one_by_one() -> None:
     assert "earth_mover_m" not in stored.metrics["e"]["ben"]
 
 
-def test_walking_distances_are_symmetric_and_far_for_unreachable_rooms() -> None:
+def test_walking_distances_are_symmetric_and_far_for_unreachable_rooms():
     plan = fleet2d.Simulation(content()).home.plan
     home = Home(plan)
     metres = walking_distances(home, home.space(0.2))

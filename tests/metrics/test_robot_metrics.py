@@ -55,7 +55,7 @@ def content(period: str = "17 min") -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def stored() -> Run:
+def stored():
     """A run whose length is no multiple of the metrics' period."""
     return run(content())
 
@@ -70,7 +70,7 @@ def gaps(stored: Run, robot: str, user: str) -> Any:
 
 
 @pytest.mark.parametrize("period", ["11 min", "1 d"])
-def test_results_do_not_depend_on_the_period(stored: Run, period: str) -> None:
+def test_results_do_not_depend_on_the_period(stored, period):
     other = run(content(period)).metrics
     for metric in METRICS:
         assert flat(other[metric]) == {
@@ -85,16 +85,14 @@ def flat(result: Any, path: str = "") -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("robot", "user"), [("astro", "ana"), ("bolt", "ben")])
-def test_co_presence_is_the_share_of_time_at_home_in_the_same_room(
-    stored: Run, robot: str, user: str
-) -> None:
+def test_co_presence_is_the_share_of_time_at_home_in_the_same_room(stored, robot, user):
     one, other = poses(stored, robot), poses(stored, user)
     home = ~other["away"]
     together = home & (one["room"] == other["room"])
     assert stored.metrics["co_presence"][robot][user] == pytest.approx(together.sum() / home.sum())
 
 
-def test_intrusion_is_the_time_in_each_zone_without_a_wall_between(stored: Run) -> None:
+def test_intrusion_is_the_time_in_each_zone_without_a_wall_between(stored):
     space = shapely.union_all(
         [shapely.Polygon(f["outline"], f["holes"]) for f in flat_document()["free"]]
     )
@@ -111,7 +109,7 @@ def test_intrusion_is_the_time_in_each_zone_without_a_wall_between(stored: Run) 
     assert result["social"] > 10
 
 
-def test_blocks_are_runs_of_steps_in_which_somebody_walks_into_the_robot(stored: Run) -> None:
+def test_blocks_are_runs_of_steps_in_which_somebody_walks_into_the_robot(stored):
     ben, gap = poses(stored, "ben"), gaps(stored, "bolt", "ben")
     steps = []
     for k in range(1, len(gap)):
@@ -124,7 +122,7 @@ def test_blocks_are_runs_of_steps_in_which_somebody_walks_into_the_robot(stored:
 
 
 @pytest.mark.parametrize("period", ["7 min", "1 d"])
-def test_users_who_step_aside_for_a_robot_are_counted(period: str) -> None:
+def test_users_who_step_aside_for_a_robot_are_counted(period):
     stands = {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [3.0, 3.1]}]}]}
     polite = {"type": "reactions", "manners": {"steps_aside": 1, "turns": 0}}
     to_and_fro = {"type": "patrol", "waypoints": [[1.0, 3.1], [4.5, 3.1]], "dwell": "1 min"}
@@ -147,7 +145,7 @@ class Polite(Behavior):
         return now.plan().note("reacts", "steps aside for astro").stay(timedelta(minutes=5))
 
 
-def test_robots_that_step_aside_for_a_robot_are_not_counted() -> None:
+def test_robots_that_step_aside_for_a_robot_are_not_counted():
     crossing = scenario(
         "20 min",
         users={"ana": {"type": "meander"}},
@@ -161,7 +159,7 @@ def test_robots_that_step_aside_for_a_robot_are_not_counted() -> None:
     assert "asides" not in result["astro"]["ana"]
 
 
-def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
+def test_travel_counts_rests_apart_and_metres(stored):
     astro = poses(stored, "astro")
     rests = []
     for place, steps in groupby(zip(astro["x"].tolist(), astro["y"].tolist(), strict=True)):
@@ -176,14 +174,14 @@ def test_travel_counts_rests_apart_and_metres(stored: Run) -> None:
 
 
 @pytest.mark.parametrize(("apart", "moves"), [(0.0, 2), (0.4, 1), (0.6, 0)])
-def test_rests_count_if_they_are_farther_apart(apart: float, moves: int) -> None:
+def test_rests_count_if_they_are_farther_apart(apart, moves):
     walk = [[1.0, 3.0], [1.5, 3.0], [1.4, 3.0]]
     tour = {"type": "patrol", "waypoints": walk, "dwell": "2 min", "start": [1.0, 3.0]}
     content = scenario("6 min", robots={"astro": tour}, metrics={"travel": {"apart": apart}})
     assert run(content).metrics["travel"]["astro"]["relocations"] == pytest.approx(moves * 240)
 
 
-def test_reach_time_is_the_distance_at_call_times_divided_by_speed(stored: Run) -> None:
+def test_reach_time_is_the_distance_at_call_times_divided_by_speed(stored):
     home_steps = np.flatnonzero(~poses(stored, "ana")["away"])
     calls = [k for k in range(0, 6000, 600) if k in set(home_steps.tolist())]
     result = stored.metrics["reach_time"]["astro"]["ana"]
@@ -193,7 +191,7 @@ def test_reach_time_is_the_distance_at_call_times_divided_by_speed(stored: Run) 
     assert result["mean"] <= result["p90"]
 
 
-def test_coverage_follows_from_the_layer_at_the_end(stored: Run) -> None:
+def test_coverage_follows_from_the_layer_at_the_end(stored):
     result = stored.metrics["coverage"]["astro"]
     assert 0.5 < result["share"] < 1
     assert 0 < result["half_h"] <= 1.67
@@ -202,7 +200,7 @@ def test_coverage_follows_from_the_layer_at_the_end(stored: Run) -> None:
     assert rows["share"][-1] == pytest.approx(result["share"])
 
 
-def test_battery_has_the_lowest_charge_and_the_dockings(stored: Run) -> None:
+def test_battery_has_the_lowest_charge_and_the_dockings(stored):
     result = stored.metrics["battery"]["astro"]
     told_ = [
         (step, name, float(d.split()[0]))
@@ -216,7 +214,7 @@ def test_battery_has_the_lowest_charge_and_the_dockings(stored: Run) -> None:
     assert {"astro"} == set(stored.metrics["battery"])
 
 
-def test_time_to_find_has_outcomes_and_times(stored: Run) -> None:
+def test_time_to_find_has_outcomes_and_times(stored):
     rows = table(stored, "time_to_find", robot="astro")
     begun = [step for step, name, _ in events(stored) if name == "find_begins"]
     ends = [
@@ -237,7 +235,7 @@ def test_time_to_find_has_outcomes_and_times(stored: Run) -> None:
     assert result["median"] <= result["p90"] if "p90" in result else True
 
 
-def test_a_search_at_the_end_of_the_run_is_censored() -> None:
+def test_a_search_at_the_end_of_the_run_is_censored():
     cut = content("1 d")
     cut["simulation"]["duration"] = "9 min 30 s"
     cut["users"]["ana"] = {
@@ -251,7 +249,7 @@ def test_a_search_at_the_end_of_the_run_is_censored() -> None:
     assert {"searches": 1, "success": 0.0, "mean": 600.0, "spl": 0.0} == result
 
 
-def test_a_wrong_verdict_not_at_home_is_counted() -> None:
+def test_a_wrong_verdict_not_at_home_is_counted():
     hidden = content("1 d")
     hidden["users"]["ana"] = {
         "type": "schedule",
@@ -265,7 +263,7 @@ def test_a_wrong_verdict_not_at_home_is_counted() -> None:
     assert (2, 2, 0.0) == (result["searches"], result["false_out"], result["success"])
 
 
-def test_a_battery_that_runs_empty_is_reported() -> None:
+def test_a_battery_that_runs_empty_is_reported():
     empty = content("1 d")
     empty["robots"]["astro"]["behaviors"] = [{"type": "dock", "threshold": 0.01}, "meander"]
     empty["robots"]["astro"]["battery"] = {**BATTERY, "charger": [7.0, 6.0]}
@@ -276,7 +274,7 @@ def test_a_battery_that_runs_empty_is_reported() -> None:
     assert 0 == result["lowest"]
 
 
-def test_a_battery_that_a_script_charges_again_is_empty_no_longer() -> None:
+def test_a_battery_that_a_script_charges_again_is_empty_no_longer():
     """It counted as empty to the end of the run, though the robot drove on."""
     empty = content("1 d")
     empty["robots"]["astro"]["behaviors"] = [{"type": "dock", "threshold": 0.01}, "meander"]
@@ -291,7 +289,7 @@ def test_a_battery_that_a_script_charges_again_is_empty_no_longer() -> None:
 
 
 @pytest.mark.parametrize("name", [*METRICS, "detections"])
-def test_every_number_of_the_closing_table_has_a_unit(stored: Run, name: str) -> None:
+def test_every_number_of_the_closing_table_has_a_unit(stored, name):
     metric = lookup("metric", name)
     result = stored.metrics.get(name) or run({**content(), "metrics": {name: {}}}).metrics[name]
     shown = flat(metric.summary(result))
@@ -305,7 +303,7 @@ def test_every_number_of_the_closing_table_has_a_unit(stored: Run, name: str) ->
 
 
 @given(st.lists(st.tuples(st.integers(1, 50), st.booleans()), min_size=1, max_size=30))
-def test_kaplan_meier_is_the_product_over_times(rows: list[tuple[int, bool]]) -> None:
+def test_kaplan_meier_is_the_product_over_times(rows):
     times, happened = [float(t) for t, _ in rows], [h for _, h in rows]
     curve = kaplan_meier(times, happened)
     for time, left in curve:
@@ -317,13 +315,13 @@ def test_kaplan_meier_is_the_product_over_times(rows: list[tuple[int, bool]]) ->
 
 
 @given(st.lists(st.integers(1, 50), min_size=1, max_size=30))
-def test_without_censoring_the_estimate_equals_the_sample(times: list[int]) -> None:
+def test_without_censoring_the_estimate_equals_the_sample(times):
     curve = kaplan_meier([float(t) for t in times], [True] * len(times))
     assert restricted_mean(curve, 60.0) == pytest.approx(np.mean(times))
     assert quantile(curve, 0.5) == pytest.approx(np.quantile(times, 0.5, method="inverted_cdf"))
 
 
-def test_events_that_never_happen_have_no_median_and_the_deadline_as_mean() -> None:
+def test_events_that_never_happen_have_no_median_and_the_deadline_as_mean():
     curve = kaplan_meier([10.0, 10.0], [False, False])
     assert quantile(curve, 0.5) is None
     assert 10.0 == restricted_mean(curve, 10.0)
@@ -347,7 +345,7 @@ class Diary(Metric):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("period", ["1 s", "7 min", "1 d"])
-def test_history_has_the_events_of_the_table(period: str) -> None:
+def test_history_has_the_events_of_the_table(period):
     scenario_content = content()
     scenario_content["simulation"]["duration"] = "40 min"
     scenario_content["metrics"] = {"diary": {"type": f"{__name__}:Diary", "period": period}}
@@ -372,7 +370,7 @@ class Listener(Algorithm):
         return {"names": ",".join(sorted({event.entity for event in history.events}))}
 
 
-def test_algorithms_hear_of_the_events_of_robots_only() -> None:
+def test_algorithms_hear_of_the_events_of_robots_only():
     told_events = content()
     told_events["algorithms"]["listener"] = {"type": f"{__name__}:Listener", "period": "50 min"}
     stored = run(told_events)

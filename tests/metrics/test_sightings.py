@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from tests.scenes import run, scenario, table
 
-from fleet2d.runs.run import Run
-
 CONFUSION = {"ana": {"ben": 1.0}, "ben": {"ana": 0.5, "cleo": 0.5}}
 
 
@@ -33,7 +31,7 @@ def content(period: str = "10 min") -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def stored() -> Run:
+def stored():
     return run(content())
 
 
@@ -41,7 +39,7 @@ def name_of(value: Any, missing: str) -> str:
     return value if isinstance(value, str) else missing
 
 
-def test_precision_and_confusion_equal_the_stored_rows(stored: Run) -> None:
+def test_precision_and_confusion_equal_the_stored_rows(stored):
     rows = table(stored, "observations", robot="astro")
     true = np.array([name_of(v, "nobody") for v in rows["true_user"]])
     perceived = np.array([name_of(v, "unknown") for v in rows["user"]])
@@ -55,7 +53,7 @@ def test_precision_and_confusion_equal_the_stored_rows(stored: Run) -> None:
             assert expected == pytest.approx(shares.get(identity, 0.0)), (who, identity)
 
 
-def test_recall_and_confusion_are_those_configured(stored: Run) -> None:
+def test_recall_and_confusion_are_those_configured(stored):
     """Looks of four hours a user in view, far more than these bounds need."""
     astro, sharp = (stored.metrics["detections"][name] for name in ("astro", "sharp"))
     looks = table(stored, "detections", robot="astro")
@@ -72,11 +70,11 @@ def test_recall_and_confusion_are_those_configured(stored: Run) -> None:
     assert {"ana": {"ana": 1.0}, "ben": {"ben": 1.0}, "cleo": {"cleo": 1.0}} == sharp["confusion"]
 
 
-def test_a_robot_that_sees_nothing_has_no_shares(stored: Run) -> None:
+def test_a_robot_that_sees_nothing_has_no_shares(stored):
     assert {} == stored.metrics["detections"]["blind"]
 
 
-def test_rows_of_all_periods_add_up_to_the_observations(stored: Run) -> None:
+def test_rows_of_all_periods_add_up_to_the_observations(stored):
     rows = table(stored, "detections")
     observed = table(stored, "observations")
     assert len(observed["step"]) == rows["observed"].sum()
@@ -87,11 +85,11 @@ def test_rows_of_all_periods_add_up_to_the_observations(stored: Run) -> None:
     assert (rows["in_view"] >= rows["detected"]).all()
 
 
-def test_results_do_not_depend_on_the_period(stored: Run) -> None:
+def test_results_do_not_depend_on_the_period(stored):
     assert stored.metrics["detections"] == run(content("7 min")).metrics["detections"]
 
 
-def test_without_users_nothing_is_stored() -> None:
+def test_without_users_nothing_is_stored():
     scene = content()
     scene["users"] = {}
     scene["robots"] = {"sharp": scene["robots"]["sharp"]}

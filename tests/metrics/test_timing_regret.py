@@ -43,7 +43,7 @@ def numbers_of(run: fleet2d.Run) -> dict[str, float]:
     return numbers
 
 
-def test_who_is_asked_at_a_bad_time_misses_the_best_one() -> None:
+def test_who_is_asked_at_a_bad_time_misses_the_best_one():
     run = life()
     row = table(run, "timing_regret")
     best_at, due_at = int(row["best_at"][0]), int(row["due_at"][0])
@@ -58,7 +58,7 @@ def test_who_is_asked_at_a_bad_time_misses_the_best_one() -> None:
     }
 
 
-def test_the_same_life_asked_at_the_best_time_has_no_regret() -> None:
+def test_the_same_life_asked_at_the_best_time_has_no_regret():
     best_at = int(table(life(), "timing_regret")["best_at"][0])
     time = timedelta(hours=7, seconds=best_at)
     opens = f"{time.seconds // 3600:02}:{time.seconds // 60 % 60:02}"
@@ -69,7 +69,7 @@ def test_the_same_life_asked_at_the_best_time_has_no_regret() -> None:
     assert numbers["value"] > 2.5
 
 
-def test_prompts_for_other_requests_count_but_not_those_for_the_same() -> None:
+def test_prompts_for_other_requests_count_but_not_those_for_the_same():
     months = {"months": {"annoyed_by": 30}, "attitude": {"annoyance": -50}}
     patient = {"sends_away_at": 1e6}
     answers = {**ANSWERS, **months, **patient}
@@ -84,7 +84,7 @@ def test_prompts_for_other_requests_count_but_not_those_for_the_same() -> None:
     assert 0 == pytest.approx(rows["best_chance"][rows["request"] == "pill ana"][0], abs=1e-6)
 
 
-def test_who_is_out_is_never_at_a_best_time() -> None:
+def test_who_is_out_is_never_at_a_best_time():
     items = [{"at": "07:02", "away": True, "activity": "work"}]
     person = {"type": "schedule", "days": [{"on": "daily", "items": items}]}
     run = life(users={"ana": person})
@@ -93,7 +93,7 @@ def test_who_is_out_is_never_at_a_best_time() -> None:
     assert 0 == numbers_of(run)["regret"]
 
 
-def test_times_are_compared_alike_whatever_the_period_and_the_spans() -> None:
+def test_times_are_compared_alike_whatever_the_period_and_the_spans():
     one, other, steps = (
         table(life(*changes), "timing_regret")
         for changes in (
@@ -106,7 +106,7 @@ def test_times_are_compared_alike_whatever_the_period_and_the_spans() -> None:
         assert one[name].tolist() == other[name].tolist() == steps[name].tolist()
 
 
-def test_algorithms_do_not_know_how_people_answer() -> None:
+def test_algorithms_do_not_know_how_people_answer():
     class Curious(Algorithm):
         """Reads the truth."""
 

@@ -34,7 +34,7 @@ def at_home(episode: Episode) -> bool:
     return not catalogue()[episode.activity].away
 
 
-def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for() -> None:
+def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for():
     straight = lives(welcome=0.5)
     days = [straight.day(MONDAY + i) for i in range(30)]
     hopping = lives(welcome=0.5)
@@ -43,7 +43,7 @@ def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for() -> None:
     ]
 
 
-def test_no_day_of_a_crowded_household_breaks_a_constraint() -> None:
+def test_no_day_of_a_crowded_household_breaks_a_constraint():
     home = lives()
     for i in range(60):
         today, after = home.day(MONDAY + i), home.day(MONDAY + i + 1)
@@ -53,7 +53,7 @@ def test_no_day_of_a_crowded_household_breaks_a_constraint() -> None:
             assert [] == [v for v in faults if "left out" not in v], name
 
 
-def test_the_bathroom_is_planned_for_one_at_a_time_even_by_those_who_are_up_at_night() -> None:
+def test_the_bathroom_is_planned_for_one_at_a_time_even_by_those_who_are_up_at_night():
     home = lives()
     used = sorted(
         (episode.begin + i * DAY_S, episode.end + i * DAY_S, name)
@@ -66,7 +66,7 @@ def test_the_bathroom_is_planned_for_one_at_a_time_even_by_those_who_are_up_at_n
     assert [] == [(a, b) for a, b in pairwise(used) if a[1] > b[0]]
 
 
-def test_what_is_done_together_begins_and_ends_at_one_time() -> None:
+def test_what_is_done_together_begins_and_ends_at_one_time():
     home = lives(members={n: CROWD[n] for n in ("ana", "ben", "cleo")}, together=DINNER)
     times = []
     for i in range(100):
@@ -78,7 +78,7 @@ def test_what_is_done_together_begins_and_ends_at_one_time() -> None:
     assert len({begin for begin, _ in times}) > 50
 
 
-def test_some_of_those_at_leisure_come_to_the_door_and_so_does_who_comes_home() -> None:
+def test_some_of_those_at_leisure_come_to_the_door_and_so_does_who_comes_home():
     home = lives(welcome=0.5)
     welcomed = came = 0
     for i in range(30):
@@ -98,12 +98,12 @@ def test_some_of_those_at_leisure_come_to_the_door_and_so_does_who_comes_home() 
     assert came / 2 < welcomed  # who comes home goes to the bathroom first at times
 
 
-def test_nobody_comes_to_the_door_unless_asked_for() -> None:
+def test_nobody_comes_to_the_door_unless_asked_for():
     day = lives().day(MONDAY)
     assert all(episode.activity != WELCOME for episodes in day.values() for episode in episodes)
 
 
-def test_members_are_away_on_trips_and_visitors_outside_their_visits() -> None:
+def test_members_are_away_on_trips_and_visitors_outside_their_visits():
     home = lives(
         trips={"ana": [["2026-01-06", "2026-01-08T12:00"]]},
         visits={"vera": [["2026-01-09T17:00", "2026-01-11T16:00"]]},
@@ -136,16 +136,14 @@ def test_members_are_away_on_trips_and_visitors_outside_their_visits() -> None:
         ({"members": {}}, ["members"]),
     ],
 )
-def test_what_is_no_household_is_refused_in_plain_words(
-    more: dict[str, Any], words: list[str]
-) -> None:
+def test_what_is_no_household_is_refused_in_plain_words(more, words):
     with pytest.raises(ValidationError) as caught:
         Household.model_validate({"members": CROWD, **more})
     for word in words:
         assert word in str(caught.value)
 
 
-def test_days_before_the_first_are_not_made_up() -> None:
+def test_days_before_the_first_are_not_made_up():
     with pytest.raises(ValueError, match="before the first day"):
         lives().day(MONDAY - 2)
 
@@ -163,26 +161,26 @@ def hours(day: list[Episode]) -> list[tuple[str, float, float]]:
     return [(episode.activity, episode.begin / HOUR, episode.end / HOUR) for episode in day]
 
 
-def test_a_day_without_periods_stays_as_it_is() -> None:
+def test_a_day_without_periods_stays_as_it_is():
     assert DAY == with_absences(DAY, MIDNIGHT, [period("14:00", "15:00")], None)
 
 
-def test_a_period_within_an_activity_cuts_it_in_two() -> None:
+def test_a_period_within_an_activity_cuts_it_in_two():
     times = hours(with_absences(DAY, MIDNIGHT, [period("09:00", "10:00")], None))
     assert [("read", 7, 9), ("holiday", 9, 10), ("read", 10, 12), ("cook", 12, 13)] == times
 
 
-def test_a_period_over_several_swallows_what_it_covers() -> None:
+def test_a_period_over_several_swallows_what_it_covers():
     times = hours(with_absences(DAY, MIDNIGHT, [period("11:00", "23:00")], None))
     assert [("read", 7, 11), ("holiday", 11, 13)] == times
 
 
-def test_a_visitor_is_away_before_and_after() -> None:
+def test_a_visitor_is_away_before_and_after():
     times = hours(with_absences(DAY, MIDNIGHT, [], [period("08:00", "12:30")]))
     assert [("holiday", 7, 8), ("read", 8, 12), ("cook", 12, 12.5), ("holiday", 12.5, 13)] == times
 
 
-def test_a_visitor_who_comes_on_another_day_is_away_all_day() -> None:
+def test_a_visitor_who_comes_on_another_day_is_away_all_day():
     visit = Period.model_validate(["2026-01-09", "2026-01-10"])
     assert [("holiday", 7, 13)] == hours(with_absences(DAY, MIDNIGHT, [], [visit]))
 
@@ -190,6 +188,6 @@ def test_a_visitor_who_comes_on_another_day_is_away_all_day() -> None:
 @pytest.mark.parametrize(
     "data", [["2026-01-06", "2026-01-05"], ["2026-01-06", "2026-01-06"], ["soon", "later"], [1]]
 )
-def test_what_is_no_period_is_refused(data: list[object]) -> None:
+def test_what_is_no_period_is_refused(data):
     with pytest.raises(ValidationError):
         Period.model_validate(data)

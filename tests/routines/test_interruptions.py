@@ -67,8 +67,8 @@ USES = st.none() | st.lists(
     st.integers(0, 99),
 )  # fmt: skip
 def test_the_core_interrupts_a_day_as_python_does(
-    needs: Any, errands: Any, firm: Any, lengths: Any, uses: Any, rooms: Any, number: int
-) -> None:
+    needs, errands, firm, lengths, uses, rooms, number
+):
     parts = needs, errands, [WORK, WALK], firm, ASLEEP, WASH + 1
     core, twin = Interruptions(*parts), SlowInterruptions(*parts)
     ends = accumulate((length for _, length, _ in lengths), initial=25_000)
@@ -84,7 +84,7 @@ def test_the_core_interrupts_a_day_as_python_does(
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_the_days_of_bundled_personas_are_those_of_python(name: str) -> None:
+def test_the_days_of_bundled_personas_are_those_of_python(name):
     lived = life(bundled_persona(name))
     rules = lived.persona.interruptions
     twin = SlowInterruptions(*rules.core.__getstate__())
@@ -99,7 +99,7 @@ def test_the_days_of_bundled_personas_are_those_of_python(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_a_day_without_its_interruptions_is_the_planned_day(name: str) -> None:
+def test_a_day_without_its_interruptions_is_the_planned_day(name):
     lived = life(bundled_persona(name))
     for ordinal in range(MONDAY, MONDAY + 400):
         plan = lived.draw_uninterrupted(ordinal, lived.template(ordinal))
@@ -107,27 +107,27 @@ def test_a_day_without_its_interruptions_is_the_planned_day(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_an_interrupted_day_has_no_gap_and_nothing_that_takes_no_time(name: str) -> None:
+def test_an_interrupted_day_has_no_gap_and_nothing_that_takes_no_time(name):
     for day in days(life(bundled_persona(name))):
         assert all(a.end == b.begin for a, b in pairwise(day))
         assert all(episode.begin < episode.end for episode in day)
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_every_persona_uses_the_toilet_as_often_as_people_do(name: str) -> None:
+def test_every_persona_uses_the_toilet_as_often_as_people_do(name):
     lived = days(life(bundled_persona(name)), 140)
     visits = [sum(episode.activity == "toilet" for episode in day) for day in lived]
     assert 4 <= statistics.mean(visits) <= 10  # Wyman et al. 2020: 2 to 10 by day, 0 to 4 at night
     assert min(visits) >= 1
 
 
-def test_without_needs_and_errands_a_day_is_its_plan() -> None:
+def test_without_needs_and_errands_a_day_is_its_plan():
     lived = of()
     assert all(day == without_interruptions(day) for day in days(lived, 20))
     assert {0} == {episode.role for day in days(lived, 20) for episode in day}
 
 
-def test_a_need_comes_up_at_its_rate_while_one_is_awake() -> None:
+def test_a_need_comes_up_at_its_rate_while_one_is_awake():
     lived = of({"drink": {"every": {"law": "gamma", "mean": "2 h", "std": "40 min"}}})
     times = [
         episode.begin for day in days(lived, 300) for episode in day if episode.activity == "drink"
@@ -136,7 +136,7 @@ def test_a_need_comes_up_at_its_rate_while_one_is_awake() -> None:
     assert all(6 * HOUR <= time <= 24 * HOUR for time in times)
 
 
-def test_a_need_in_the_night_wakes_one_who_sleeps_on_afterwards() -> None:
+def test_a_need_in_the_night_wakes_one_who_sleeps_on_afterwards():
     lived = of({"toilet": {"every": "3 h", "asleep": {"law": "gamma", "mean": "4 h"}}})
     up = 0
     for day in days(lived):
@@ -147,7 +147,7 @@ def test_a_need_in_the_night_wakes_one_who_sleeps_on_afterwards() -> None:
     assert 1 < up / 100 < 2.5
 
 
-def test_hands_are_washed_right_after_the_toilet_as_often_as_stated() -> None:
+def test_hands_are_washed_right_after_the_toilet_as_often_as_stated():
     lived = of({"toilet": {"every": "2 h", "then": {"wash_hands": 0.8}}})
     after = [b.activity for day in days(lived, 200) for a, b in pairwise(day)
              if a.activity == "toilet"]  # fmt: skip
@@ -155,7 +155,7 @@ def test_hands_are_washed_right_after_the_toilet_as_often_as_stated() -> None:
     assert 0.8 == pytest.approx(washed, abs=0.03)
 
 
-def test_a_need_waits_for_the_end_of_what_is_not_interruptible() -> None:
+def test_a_need_waits_for_the_end_of_what_is_not_interruptible():
     shower = {"at": "12:00", "spread": "0 s", "takes": "20 min"}
     day = {**IDLE["days"]["any_day"], "do": {"shower": shower}}
     lived = of({"drink": "20 min"}, days={"any_day": day})
@@ -164,7 +164,7 @@ def test_a_need_waits_for_the_end_of_what_is_not_interruptible() -> None:
         assert 1 == len(washes)
 
 
-def test_calls_come_only_at_their_times_of_day() -> None:
+def test_calls_come_only_at_their_times_of_day():
     call = {"every": {"law": "exponential", "mean": "1 h"}, "between": ["10:00", "12:00"]}
     lived = of({"phone_call": {**call, "patience": "0 s"}})
     begins = [d.begin for day in days(lived, 200) for d in day if d.activity == "phone_call"]
@@ -172,7 +172,7 @@ def test_calls_come_only_at_their_times_of_day() -> None:
     assert all(10 * HOUR <= time % DAY_S <= 12 * HOUR + 60 for time in begins)
 
 
-def test_errands_are_done_between_the_activities_that_they_name() -> None:
+def test_errands_are_done_between_the_activities_that_they_name():
     day = {**IDLE["days"]["any_day"], "do": {"shopping": {"at": "10:00"}}}
     lived = of(None, {"put_away": {"probability": 1, "after": ["shopping"]}}, days={"any_day": day})
     for one in days(lived):
@@ -181,7 +181,7 @@ def test_errands_are_done_between_the_activities_that_they_name() -> None:
         assert 1 == sum(episode.activity == "put_away" for episode in one)
 
 
-def test_what_was_interrupted_is_gone_on_with() -> None:
+def test_what_was_interrupted_is_gone_on_with():
     lived = of({"drink": "1 h"})
     for day in days(lived, 50):
         for before, need, after in zip(day, day[1:], day[2:], strict=False):
@@ -189,7 +189,7 @@ def test_what_was_interrupted_is_gone_on_with() -> None:
                 assert before.role == INTERRUPTS or before.activity == after.activity
 
 
-def test_a_day_full_of_needs_has_numbers_for_its_draws() -> None:
+def test_a_day_full_of_needs_has_numbers_for_its_draws():
     lived = of({f"need_{i}": {"every": "6 min", "activity": "drink"} for i in range(6)})
     assert all(len(day) <= MOST + 40 for day in days(lived, 10))
 
@@ -202,9 +202,7 @@ def test_a_day_full_of_needs_has_numbers_for_its_draws() -> None:
         ({"errands": {"fetch": {"probability": 1, "after": ["cok"]}}}, ["after", "cook"]),
     ],
 )
-def test_needs_that_are_none_are_refused_in_plain_words(
-    persona: dict[str, Any], words: list[str]
-) -> None:
+def test_needs_that_are_none_are_refused_in_plain_words(persona, words):
     with pytest.raises(ValidationError) as failure:
         Persona.model_validate({**IDLE, **persona})
     assert all(word in str(failure.value) for word in words)

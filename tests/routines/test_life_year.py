@@ -36,7 +36,7 @@ def day(ordinal: int) -> str:
     return date.fromordinal(ordinal).isoformat()
 
 
-def test_an_illness_comes_as_often_and_lasts_as_long_as_it_says() -> None:
+def test_an_illness_comes_as_often_and_lasts_as_long_as_it_says():
     found = spans(FLU, years=60)
     lengths = [last - first + 1 for first, last in found]
     assert 60 * 365 / (60 + 4) == pytest.approx(len(found), rel=0.1)
@@ -45,7 +45,7 @@ def test_an_illness_comes_as_often_and_lasts_as_long_as_it_says() -> None:
     assert spans(FLU, years=2) != spans(FLU, years=2, seed=5)
 
 
-def test_a_vacation_begins_within_its_part_of_each_year() -> None:
+def test_a_vacation_begins_within_its_part_of_each_year():
     found = spans({"yearly": ["07-10", "08-20"], "lasts": "14 d", "away": True}, years=20)
     assert len(found) == 20
     assert all("07-10" <= day(first)[5:] <= "08-20" for first, _ in found)
@@ -55,7 +55,7 @@ def test_a_vacation_begins_within_its_part_of_each_year() -> None:
 HEAT = {"every": "20 d", "season": ["06-01", "08-31"], "lasts": "4 d", "days": "hot"}
 
 
-def test_heat_comes_by_chance_and_begins_in_its_season_only() -> None:
+def test_heat_comes_by_chance_and_begins_in_its_season_only():
     found = spans(HEAT, years=30)
     anytime = spans({name: value for name, value in HEAT.items() if name != "season"}, years=30)
 
@@ -64,13 +64,13 @@ def test_heat_comes_by_chance_and_begins_in_its_season_only() -> None:
     assert 30 * 92 / 24 == pytest.approx(len(found), rel=0.15)
 
 
-def test_a_season_of_chance_may_last_past_new_year() -> None:
+def test_a_season_of_chance_may_last_past_new_year():
     found = spans({**HEAT, "season": ["12-01", "01-31"]}, years=10)
 
     assert {"12", "01"} == {day(first)[5:7] for first, _ in found}
 
 
-def test_days_of_heat_have_a_siesta_and_an_evening_outside() -> None:
+def test_days_of_heat_have_a_siesta_and_an_evening_outside():
     days = {"season": ["06-01", "08-31"], "days": "hot"}
     june = date(2026, 6, 1).toordinal()
     lives = life(), life(heat=days)
@@ -82,7 +82,7 @@ def test_days_of_heat_have_a_siesta_and_an_evening_outside() -> None:
     assert hot.count("work") == 0
 
 
-def test_a_season_may_last_past_new_year_and_end_on_a_leap_day() -> None:
+def test_a_season_may_last_past_new_year_and_end_on_a_leap_day():
     found = spans({"season": ["11-15", "02-29"], "days": "day_off"}, years=3)
     assert [(day(first), day(last)) for first, last in found] == [
         ("2025-11-15", "2026-02-28"),
@@ -92,13 +92,13 @@ def test_a_season_may_last_past_new_year_and_end_on_a_leap_day() -> None:
     ]
 
 
-def test_what_is_once_and_has_no_length_is_for_good() -> None:
+def test_what_is_once_and_has_no_length_is_for_good():
     (span,) = spans({"once": ["2026-09-01", "2026-12-01"], "becomes": "retired"}, years=3)
     assert "2026-09-01" <= day(span[0]) <= "2026-12-01"
     assert span[1] == FOREVER
 
 
-def test_a_public_holiday_is_one_of_its_country_and_is_stored_with_the_persona() -> None:
+def test_a_public_holiday_is_one_of_its_country_and_is_stored_with_the_persona():
     pytest.importorskip("holidays")
     feasts = persona(feasts={"holidays": "DE-BY", "days": "day_off"})
     assert [day(first) for first, _ in spans(feasts.year["feasts"].model_dump())][:3] == [
@@ -111,7 +111,7 @@ def test_a_public_holiday_is_one_of_its_country_and_is_stored_with_the_persona()
     assert Persona.model_validate(feasts.model_dump(mode="json")) == feasts
 
 
-def test_ill_people_stay_at_home_and_sleep_by_day() -> None:
+def test_ill_people_stay_at_home_and_sleep_by_day():
     own = life(flu=FLU)
     ill = [d for d in range(MONDAY, MONDAY + 200) if own.template(d).name == "ill"]
     assert ill
@@ -122,7 +122,7 @@ def test_ill_people_stay_at_home_and_sleep_by_day() -> None:
     assert any("nap" in [e.activity for e in own.day(d)] for d in ill)
 
 
-def test_all_other_days_are_as_without_the_event() -> None:
+def test_all_other_days_are_as_without_the_event():
     own, usual = life(flu=FLU), Life(persona(), 4, "users.ana")
     for ordinal in range(MONDAY, MONDAY + 100):
         about = {own.template(ordinal + i).name for i in range(2)}
@@ -130,7 +130,7 @@ def test_all_other_days_are_as_without_the_event() -> None:
             assert own.day(ordinal) == usual.day(ordinal)
 
 
-def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for() -> None:
+def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for():
     year = {"flu": FLU, "leaves": {"yearly": ["02-01", "02-10"], "lasts": "7 d", "away": True}}
     straight, hopping = life(**year), life(**year)
     days = {ordinal: straight.day(ordinal) for ordinal in range(MONDAY, MONDAY + 60)}
@@ -138,7 +138,7 @@ def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for() -> None:
         assert hopping.day(ordinal) == days[ordinal]
 
 
-def test_on_vacation_nobody_is_at_home_from_ten_on_the_first_day_to_six_on_the_last() -> None:
+def test_on_vacation_nobody_is_at_home_from_ten_on_the_first_day_to_six_on_the_last():
     own = life(leaves={"once": date(2026, 3, 2), "lasts": ["7 d", "7 d"], "away": True})
     first = date(2026, 3, 2).toordinal()
     away = [
@@ -153,7 +153,7 @@ def test_on_vacation_nobody_is_at_home_from_ten_on_the_first_day_to_six_on_the_l
     assert sum(end - begin for _, begin, end in away) == 6 * 86_400 + 64_800 - 36_000
 
 
-def test_who_retires_lives_the_days_of_the_retired_from_then_on() -> None:
+def test_who_retires_lives_the_days_of_the_retired_from_then_on():
     own = life(retires={"once": date(2026, 3, 2), "becomes": "retired"})
     retired = Life(persona("retired"), 4, "users.ana")
     first = date(2026, 3, 2).toordinal()
@@ -161,7 +161,7 @@ def test_who_retires_lives_the_days_of_the_retired_from_then_on() -> None:
     assert own.day(first + 10) == retired.day(first + 10)
 
 
-def test_a_family_is_on_vacation_at_one_time() -> None:
+def test_a_family_is_on_vacation_at_one_time():
     members = {"ana": "works_outside", "cleo": "child"}
     summer = {"yearly": ["07-10", "08-20"], "lasts": ["14 d", "14 d"], "away": True}
     household = Household.model_validate({"members": members, "year": {"summer": summer}})
@@ -175,7 +175,7 @@ def test_a_family_is_on_vacation_at_one_time() -> None:
     assert len(away["ana"]) == 14
 
 
-def test_a_guest_comes_by_chance_and_stays_for_some_hours() -> None:
+def test_a_guest_comes_by_chance_and_stays_for_some_hours():
     members = {"ana": "works_outside", "vera": "retired"}
     visits = {"vera": {"every": "4 d", "between": ["14:00", "16:00"], "takes": ["30 min", "2 h"]}}
     home = Lives(Household.model_validate({"members": members, "visits": visits}), 4, MONDAY - 1)
@@ -188,7 +188,7 @@ def test_a_guest_comes_by_chance_and_stays_for_some_hours() -> None:
     assert all(1800 <= stay <= 7200 for stay in came)
 
 
-def test_a_year_in_a_home_runs_and_is_the_same_for_other_spans() -> None:
+def test_a_year_in_a_home_runs_and_is_the_same_for_other_spans():
     year = {
         "flu": {"every": "10 d", "lasts": "2 d", "days": "ill"},
         "moves": {"once": "2026-01-07", "becomes": "student"},
@@ -213,13 +213,13 @@ def test_a_year_in_a_home_runs_and_is_the_same_for_other_spans() -> None:
         ({"holidays": "DE-XY", "away": True}, "no holidays are known of 'DE-XY'"),
     ],
 )
-def test_what_is_no_event_is_refused(event: dict[str, Any], message: str) -> None:
+def test_what_is_no_event_is_refused(event, message):
     pytest.importorskip("holidays")
     with pytest.raises(ValidationError, match=message):
         persona(event=event)
 
 
-def test_a_household_becomes_nobody_else_and_names_templates_of_its_members() -> None:
+def test_a_household_becomes_nobody_else_and_names_templates_of_its_members():
     for event, message in (
         ({"once": "2026-01-01", "becomes": "retired"}, "only a member"),
         ({"once": "2026-01-01", "days": "weekday"}, "did you mean 'weekdays'"),
@@ -228,12 +228,12 @@ def test_a_household_becomes_nobody_else_and_names_templates_of_its_members() ->
             Household.model_validate({"members": {"ana": "works_outside"}, "year": {"x": event}})
 
 
-def test_a_night_too_short_before_an_event_is_refused() -> None:
+def test_a_night_too_short_before_an_event_is_refused():
     with pytest.raises(ValidationError, match="too short a night"):
         persona("night_shift", flu=FLU)
 
 
-def test_every_bundled_template_can_follow_the_days_of_who_sleeps_at_night() -> None:
+def test_every_bundled_template_can_follow_the_days_of_who_sleeps_at_night():
     for name in ("child", "retired", "student", "works_from_home", "works_outside"):
         year = {day: {"every": "30 d", "lasts": "2 d", "days": day} for day in bundled_days()}
         own = Life(persona(name, **year), 4, "users.ana")

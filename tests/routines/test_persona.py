@@ -1,7 +1,6 @@
 """Personas that extend others, what interrupts their stays, and how long they are out."""
 
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,7 +19,7 @@ def read(value: Any) -> Persona:
     return TypeAdapter(AnyPersona).validate_python(value)
 
 
-def test_of_several_personas_each_changes_those_before_it(tmp_path: Path) -> None:
+def test_of_several_personas_each_changes_those_before_it(tmp_path):
     (tmp_path / "slow.yaml").write_text("pace: 0.5\nabout: slow\n")
     extended = read({"extends": ["student", str(tmp_path / "slow.yaml")], "about": "mine"})
     assert (0.5, "mine") == (extended.pace, extended.about)
@@ -28,13 +27,13 @@ def test_of_several_personas_each_changes_those_before_it(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_everybody_gets_up_within_stays(name: str) -> None:
+def test_everybody_gets_up_within_stays(name):
     assert {"pick_up", "freshen_up"} < set(bundled_persona(name).needs)
     assert {"pick_up", "freshen_up"} < set(usual_needs())
 
 
 @pytest.mark.parametrize(("needs", "fetches"), [("", False), ("needs: {pick_up: null}\n", True)])
-def test_short_stays_take_the_place_of_fetches(needs: str, fetches: bool, tmp_path: Path) -> None:
+def test_short_stays_take_the_place_of_fetches(needs, fetches, tmp_path):
     own = "activities: {tv: {rooms: [office], fetches: 5 min}}\n"
     (tmp_path / "ana.yaml").write_text(f"days: {{every: {{on: daily}}}}\n{own}{needs}")
     persona = read(str(tmp_path / "ana.yaml"))
@@ -51,13 +50,13 @@ def test_short_stays_take_the_place_of_fetches(needs: str, fetches: bool, tmp_pa
         ({"extends": []}, "days"),
     ],
 )
-def test_a_wrong_extension_is_an_error_that_says_what_to_write(value: Any, words: str) -> None:
+def test_a_wrong_extension_is_an_error_that_says_what_to_write(value, words):
     with pytest.raises(ValidationError, match=r"(?s)" + words.replace("[", r"\[")):
         read(value)
 
 
 @pytest.mark.parametrize(("name", "often"), [("retired", 1.9), ("retired_active", 3.0)])
-def test_the_retired_are_out_for_2_to_4_h_a_day(name: str, often: float) -> None:
+def test_the_retired_are_out_for_2_to_4_h_a_day(name, often):
     """The American Time Use Survey has 3.0 outings and 2.2 h a day of the retired."""
     persona = bundled_persona(name)
     life, days = Life(persona, 4, "users.ana"), 140
@@ -73,7 +72,7 @@ def test_the_retired_are_out_for_2_to_4_h_a_day(name: str, often: float) -> None
     assert 2 < out_s / HOUR / days < 4
 
 
-def test_short_stays_interrupt_a_stay_for_less_than_minutes() -> None:
+def test_short_stays_interrupt_a_stay_for_less_than_minutes():
     lived = Life(bundled_persona("works_from_home"), 4, "users.ana")
     took = [
         episode.end - episode.begin

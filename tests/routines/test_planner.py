@@ -36,7 +36,7 @@ def tasks(day: list[Episode]) -> list[str]:
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_no_day_of_thousands_breaks_a_constraint(name: str) -> None:
+def test_no_day_of_thousands_breaks_a_constraint(name):
     persona = bundled_persona(name)
     for seed in range(5 if THOROUGH else 1):
         lived = life(persona, seed)
@@ -45,7 +45,7 @@ def test_no_day_of_thousands_breaks_a_constraint(name: str) -> None:
             assert [] == violations(persona, MONDAY + i, day, after)
 
 
-def test_wake_meal_and_bed_times_spread_as_stated() -> None:
+def test_wake_meal_and_bed_times_spread_as_stated():
     persona = bundled_persona("works_outside")
     lived = life(persona)
     days = [
@@ -65,7 +65,7 @@ def test_wake_meal_and_bed_times_spread_as_stated() -> None:
         assert spread == pytest.approx(statistics.pstdev(times), rel=0.25)
 
 
-def test_one_seed_gives_one_life_and_two_seeds_give_two() -> None:
+def test_one_seed_gives_one_life_and_two_seeds_give_two():
     persona = bundled_persona("student")
     week = range(MONDAY, MONDAY + 7)
     one, same, other, elsewhere = (
@@ -77,14 +77,14 @@ def test_one_seed_gives_one_life_and_two_seeds_give_two() -> None:
     assert all(a != b for a, b in zip(one, elsewhere, strict=True))
 
 
-def test_a_day_does_not_depend_on_which_were_asked_for_before() -> None:
+def test_a_day_does_not_depend_on_which_were_asked_for_before():
     persona = bundled_persona("retired")
     straight = life(persona)
     days = [straight.day(MONDAY + i) for i in range(30)]
     assert days[17] == life(persona).day(MONDAY + 17)
 
 
-def test_durations_are_not_geometric_but_as_their_law_says() -> None:
+def test_durations_are_not_geometric_but_as_their_law_says():
     persona = of(
         {"cook": {"between": ["10:00", "12:00"], "takes": {"mean": "1 h", "std": "10 min"}}}
     )
@@ -95,14 +95,14 @@ def test_durations_are_not_geometric_but_as_their_law_says() -> None:
     assert HOUR / 6 == pytest.approx(statistics.pstdev(lasted), rel=0.1)  # a geometric law: 1 h
 
 
-def test_probability_is_the_share_of_days() -> None:
+def test_probability_is_the_share_of_days():
     persona = of({"shopping": {"between": ["10:00", "18:00"], "probability": 0.3}})
     lived = life(persona)
     done = sum("shopping" in tasks(lived.day(MONDAY + i)) for i in range(3000))
     assert 0.3 == pytest.approx(done / 3000, abs=0.03)
 
 
-def test_what_follows_comes_at_once_and_only_after_what_it_follows() -> None:
+def test_what_follows_comes_at_once_and_only_after_what_it_follows():
     persona = of(
         {
             "dishes": {"after": ["dinner"]},
@@ -118,7 +118,7 @@ def test_what_follows_comes_at_once_and_only_after_what_it_follows() -> None:
             assert names.index("dishes") == names.index("dinner") + 1
 
 
-def test_an_appointment_is_kept_to_the_second_however_full_the_day() -> None:
+def test_an_appointment_is_kept_to_the_second_however_full_the_day():
     crowd = {
         f"errand_{i}": {"activity": "errand", "between": ["09:00", "16:00"], "probability": 0.9}
         for i in range(12)
@@ -131,7 +131,7 @@ def test_an_appointment_is_kept_to_the_second_however_full_the_day() -> None:
         assert [] == violations(persona, MONDAY + i, day, lived.day(MONDAY + i + 1))
 
 
-def test_the_least_frequent_is_left_out_when_a_day_is_too_full() -> None:
+def test_the_least_frequent_is_left_out_when_a_day_is_too_full():
     long = {"takes": {"law": "fixed", "mean": "6 h"}, "between": ["07:00", "22:00"]}
     persona = of(
         {
@@ -149,7 +149,7 @@ def test_the_least_frequent_is_left_out_when_a_day_is_too_full() -> None:
     assert sum("study" in names for names in drawn) == pytest.approx(0.95 * 500, abs=25)
 
 
-def test_dates_have_their_own_day() -> None:
+def test_dates_have_their_own_day():
     persona = Persona.model_validate(
         {
             "days": {
@@ -164,7 +164,7 @@ def test_dates_have_their_own_day() -> None:
     ]
 
 
-def test_waiting_is_filled_with_what_the_hour_allows() -> None:
+def test_waiting_is_filled_with_what_the_hour_allows():
     persona = Persona.model_validate(
         {
             "leisure": {"tv": {"between": ["18:00", "21:00"]}, "read": 1},
@@ -203,21 +203,19 @@ def test_waiting_is_filled_with_what_the_hour_allows() -> None:
         ({"cook": {"at": "12:00", "takes": {"law": "measured", "quantiles": ["1 h"]}}}, ["quantiles"]),
     ],
 )  # fmt: skip
-def test_a_template_that_is_impossible_is_refused_in_plain_words(
-    do: dict[str, Any], words: list[str]
-) -> None:
+def test_a_template_that_is_impossible_is_refused_in_plain_words(do, words):
     with pytest.raises(ValidationError) as caught:
         of(do)
     for word in words:
         assert word in str(caught.value)
 
 
-def test_a_night_that_is_too_short_is_refused() -> None:
+def test_a_night_that_is_too_short_is_refused():
     with pytest.raises(ValidationError, match="too short a night"):
         of({}, wake="05:00", sleep={"at": "02:00", "at_least": "6 h"})
 
 
-def test_days_of_the_week_without_a_template_are_named() -> None:
+def test_days_of_the_week_without_a_template_are_named():
     with pytest.raises(ValidationError, match="saturday, sunday"):
         Persona.model_validate({"days": {"work": {"on": "weekdays"}}})
 
@@ -254,7 +252,7 @@ def templates(draw: st.DrawFn) -> dict[str, Any]:
 
 @settings(max_examples=examples(60))
 @given(do=templates(), seed=st.integers(0, 1000))
-def test_any_template_is_either_refused_or_kept(do: dict[str, Any], seed: int) -> None:
+def test_any_template_is_either_refused_or_kept(do, seed):
     try:
         persona = of(do)
     except ValidationError:
@@ -287,13 +285,13 @@ def same_in_python(lived: Life, ordinal: int) -> None:
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_the_core_plans_days_as_python_does(name: str) -> None:
+def test_the_core_plans_days_as_python_does(name):
     lived = life(bundled_persona(name))
     for ordinal in range(MONDAY, MONDAY + 60):
         same_in_python(lived, ordinal)
 
 
-def test_pastimes_that_always_take_no_time_are_refused() -> None:
+def test_pastimes_that_always_take_no_time_are_refused():
     """Two of them took turns forever, and the run never began."""
     takes = {"takes": ["0 s", "1 s"]}
     with pytest.raises(ValidationError, match="'read' may take 0 s"):
@@ -306,7 +304,7 @@ def test_pastimes_that_always_take_no_time_are_refused() -> None:
         )
 
 
-def test_sleep_over_midnight_belongs_to_the_day_before() -> None:
+def test_sleep_over_midnight_belongs_to_the_day_before():
     lived = life(bundled_persona("student"))
     late = [without_interruptions(lived.day(MONDAY + i))[-1] for i in range(60)]
     assert any(episode.begin > DAY_S for episode in late)

@@ -25,18 +25,18 @@ def persona(*days: str) -> Persona:
 
 
 @pytest.mark.parametrize("text", [*DAYS, SECONDS])
-def test_a_day_is_written_as_it_is_read(text: str) -> None:
+def test_a_day_is_written_as_it_is_read(text):
     assert text == write_day(parse_day(text))
 
 
-def test_a_stay_of_seconds_lasts_as_recorded() -> None:
+def test_a_stay_of_seconds_lasts_as_recorded():
     life = Life(persona(SECONDS), 4, "users.ana")
     lengths = {e.end - e.begin for i in range(20) for e in life.day(MONDAY + i)}
     assert {17, 20} <= lengths
     assert min(lengths) == 17
 
 
-def test_days_have_no_gap_and_end_asleep_when_the_next_begins() -> None:
+def test_days_have_no_gap_and_end_asleep_when_the_next_begins():
     life = Life(persona(), 4, "users.ana")
     for i in range(200):
         day, after = life.day(MONDAY + i), life.day(MONDAY + i + 1)
@@ -46,7 +46,7 @@ def test_days_have_no_gap_and_end_asleep_when_the_next_begins() -> None:
         assert day[-1].end == after[0].begin + 86_400
 
 
-def test_most_days_are_like_no_recorded_one_and_hold_nothing_else() -> None:
+def test_most_days_are_like_no_recorded_one_and_hold_nothing_else():
     life = Life(persona(), 4, "users.ana")
     orders = {tuple(d.activity for d in life.day(MONDAY + i)) for i in range(200)}
     recorded = {parse_day(text).activities for text in DAYS}
@@ -54,7 +54,7 @@ def test_most_days_are_like_no_recorded_one_and_hold_nothing_else() -> None:
     assert {name for order in orders for name in order} == {n for day in recorded for n in day}
 
 
-def test_members_of_a_household_keep_out_of_each_others_bathroom() -> None:
+def test_members_of_a_household_keep_out_of_each_others_bathroom():
     members = {"ana": persona(), "ben": persona()}
     lives = Lives(Household(members=members), 4, MONDAY)
     for i in range(60):
@@ -64,7 +64,7 @@ def test_members_of_a_household_keep_out_of_each_others_bathroom() -> None:
         assert all(a[1] <= b[0] for a, b in pairwise(busy))
 
 
-def test_what_a_household_does_together_takes_the_place_of_what_would_be_done() -> None:
+def test_what_a_household_does_together_takes_the_place_of_what_would_be_done():
     joint = {"dinner": {"at": "19:00", "spread": "0 s", "on": "daily", "takes": "40 min"}}
     members = {"ana": persona(), "ben": persona()}
     day = Lives(Household(members=members, together=joint), 4, MONDAY).day(MONDAY + 3)
@@ -84,6 +84,6 @@ def test_what_a_household_does_together_takes_the_place_of_what_would_be_done() 
         (["07:00 wsh, 23:00 sleep, 31:00 end"], "wash"),
     ],
 )
-def test_what_is_no_recorded_day_is_refused(days: list[str], words: str) -> None:
+def test_what_is_no_recorded_day_is_refused(days, words):
     with pytest.raises(ValidationError, match=words):
         persona(*days)

@@ -1,7 +1,6 @@
 """Moments as people write them."""
 
 from datetime import datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,20 +28,20 @@ HOUR = 3600
         ("10 d", 240 * HOUR),
     ],
 )
-def test_moment_is_read(text: str, step: int) -> None:
+def test_moment_is_read(text, step):
     assert step == step_of(text, CLOCK)
 
 
 @pytest.mark.parametrize(
     "text", ["", "noon", "day 3 25:00", "day 3 10:99", "2026-01-05T07:00Z", "step x", "-2 h"]
 )
-def test_what_names_no_moment_is_refused_with_examples(text: str) -> None:
+def test_what_names_no_moment_is_refused_with_examples(text):
     with pytest.raises(InputError, match="day 3 18:30"):
         step_of(text, CLOCK)
 
 
 @pytest.mark.parametrize("text", ["day 1 05:59", "day 99", "11 d", "2025-01-01", "step 9999999"])
-def test_moment_outside_the_run_is_refused_with_its_dates(text: str) -> None:
+def test_moment_outside_the_run_is_refused_with_its_dates(text):
     with pytest.raises(InputError, match="2026-01-05 06:00 to 2026-01-15 06:00"):
         step_of(text, CLOCK)
 
@@ -51,7 +50,7 @@ SECOND = timedelta(seconds=1)
 
 
 @pytest.fixture(scope="module")
-def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_dir(tmp_path_factory):
     """A stored run of nine hours."""
     folder = tmp_path_factory.mktemp("moments") / "run"
     fleet2d.run("bundled:paper", "simulation.duration=9 h", seed=11, out=folder)
@@ -61,7 +60,7 @@ def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("first", "end"), [(0, 3600), (7000, 7001), (3601, 30_000), (20_000, 32_400)]
 )
-def test_poses_of_a_part_are_those_of_the_run(run_dir: Path, first: int, end: int) -> None:
+def test_poses_of_a_part_are_those_of_the_run(run_dir, first, end):
     run = fleet2d.open_run(run_dir)
     part = part_of_run(run, first, end)
     for name in ("ana", "astro"):
@@ -70,7 +69,7 @@ def test_poses_of_a_part_are_those_of_the_run(run_dir: Path, first: int, end: in
             assert np.array_equal(getattr(complete, values)[first:end], getattr(cut, values))
 
 
-def test_random_walk_can_be_cut() -> None:
+def test_random_walk_can_be_cut():
     run = fleet2d.run(
         {
             "simulation": {"duration": "2 h", "start": "2026-01-05", "seed": 1},
@@ -82,7 +81,7 @@ def test_random_walk_can_be_cut() -> None:
     assert run.path("ana", SECOND).x[4000:6000].tolist() == part.path("ana", SECOND).x.tolist()
 
 
-def test_rows_outside_are_left_out_and_steps_count_from_zero(run_dir: Path) -> None:
+def test_rows_outside_are_left_out_and_steps_count_from_zero(run_dir):
     run = fleet2d.open_run(run_dir)
     part = part_of_run(run, 3600, 7200)
     steps = run.tables["events"]["step"].to_numpy()
@@ -91,6 +90,6 @@ def test_rows_outside_are_left_out_and_steps_count_from_zero(run_dir: Path) -> N
     assert {} == part.metrics
 
 
-def test_whole_run_is_itself(run_dir: Path) -> None:
+def test_whole_run_is_itself(run_dir):
     run = fleet2d.open_run(run_dir)
     assert run is part_of_run(run, 0, run.manifest["steps"])

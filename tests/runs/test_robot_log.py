@@ -36,7 +36,7 @@ def log(first: int = 0, end: int = 7200, source: str = "", **more: Any) -> list[
     return [entry for entry in entries if source in ("", entry.source)]
 
 
-def test_it_has_each_event_of_the_robot_and_of_nobody_else() -> None:
+def test_it_has_each_event_of_the_robot_and_of_nobody_else():
     rows = table(stored(), "events", entity="astro")
     told = [(e.step, e.text.split()[0]) for e in log(end=3600) if e.source not in ("decision", "drive", "fault")]  # fmt: skip
 
@@ -45,7 +45,7 @@ def test_it_has_each_event_of_the_robot_and_of_nobody_else() -> None:
     assert told
 
 
-def test_power_and_faults_stand_out_and_say_how_long_they_lasted() -> None:
+def test_power_and_faults_stand_out_and_say_how_long_they_lasted():
     assert [
         LogEntry(300, "ERROR", "power", "power_off crash"),
         LogEntry(420, "INFO", "power", "power_on crash, was off for 2 min"),
@@ -55,11 +55,11 @@ def test_power_and_faults_stand_out_and_say_how_long_they_lasted() -> None:
     assert [LogEntry(1200, "ERROR", "fault", "fault wheels for 5 min")] == log(source="fault")
 
 
-def test_a_stretch_that_begins_while_it_is_off_knows_since_when() -> None:
+def test_a_stretch_that_begins_while_it_is_off_knows_since_when():
     assert ["power_on off, was off for 10 min"] == [e.text for e in log(3100, source="power")]
 
 
-def test_moves_are_those_of_its_path_whatever_part_is_read() -> None:
+def test_moves_are_those_of_its_path_whatever_part_is_read():
     poses = path(stored(), "astro")
     moves = list(moves_of(stored(), "astro", 0, 40 * 3600))
     moved = sum(move.metres for move in moves)
@@ -77,7 +77,7 @@ def complex_steps(poses: Any) -> Any:
     return places[1:] - places[:-1]
 
 
-def test_decisions_that_were_not_stored_come_from_the_repeated_run() -> None:
+def test_decisions_that_were_not_stored_come_from_the_repeated_run():
     run = stored(decisions=False)
     again = robot_log(run, "astro", 0, 7200, decisions_of(run))
 
@@ -88,14 +88,14 @@ def test_decisions_that_were_not_stored_come_from_the_repeated_run() -> None:
     }
 
 
-def test_days_are_those_of_the_calendar() -> None:
+def test_days_are_those_of_the_calendar():
     hour = 3600
     assert [(0, 17 * hour), (17 * hour, 40 * hour)] == [day_of(stored(), day) for day in (1, 2)]
     with pytest.raises(InputError, match="no day 3: its days are 1 to 2"):
         day_of(stored(), 3)
 
 
-def test_as_text_it_has_a_head_for_each_day() -> None:
+def test_as_text_it_has_a_head_for_each_day():
     lines = list(log_lines(log(0, 40 * 3600), stored().clock))
 
     assert "-- day 1, Monday 2026-01-05" == lines[0]
@@ -103,6 +103,6 @@ def test_as_text_it_has_a_head_for_each_day() -> None:
     assert 1 == lines.count("-- day 2, Tuesday 2026-01-06")
 
 
-def test_an_unknown_robot_is_refused() -> None:
+def test_an_unknown_robot_is_refused():
     with pytest.raises(InputError, match="no robot 'astr': did you mean 'astro'"):
         robot_log(stored(), "astr", 0, 10)

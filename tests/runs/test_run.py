@@ -2,8 +2,6 @@
 
 import json
 import sys
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -20,13 +18,13 @@ ROWS = rows_of_every_kind(300)
 
 
 @pytest.fixture
-def directory(tmp_path: Path) -> Path:
+def directory(tmp_path):
     """A complete run."""
     stored(ROWS, directory=tmp_path / "run", flush_rows=100)
     return tmp_path / "run"
 
 
-def test_run_in_memory_reads_like_a_stored_one(directory: Path) -> None:
+def test_run_in_memory_reads_like_a_stored_one(directory):
     for run in (open_run(directory), open_store(stored(ROWS))):
         assert "complete" == run.status
         assert ["every_kind"] == list(run.tables)
@@ -37,7 +35,7 @@ def test_run_in_memory_reads_like_a_stored_one(directory: Path) -> None:
         assert [] == run.verify()
 
 
-def test_pandas_and_polars(directory: Path) -> None:
+def test_pandas_and_polars(directory):
     pytest.importorskip("pandas")
     pytest.importorskip("polars")
     run = open_run(directory)
@@ -49,23 +47,21 @@ def test_pandas_and_polars(directory: Path) -> None:
 
 
 @pytest.mark.parametrize(("package", "extra"), [("pandas", "pandas"), ("polars", "study")])
-def test_package_that_is_not_installed(
-    directory: Path, monkeypatch: pytest.MonkeyPatch, package: str, extra: str
-) -> None:
+def test_package_that_is_not_installed(directory, monkeypatch, package, extra):
     monkeypatch.setitem(sys.modules, package, None)
 
     with pytest.raises(InputError, match=rf'pip install "fleet2d\[{extra}\]"'):
         getattr(open_run(directory), package)("every_kind")
 
 
-def test_unknown_table_names_the_nearest(directory: Path) -> None:
+def test_unknown_table_names_the_nearest(directory):
     with pytest.raises(ArtifactError, match="did you mean 'every_kind'"):
         open_run(directory).arrow("evry_kind")
     with pytest.raises(KeyError):
         open_run(directory).tables["evry_kind"]
 
 
-def test_tables_are_read_when_asked_for(directory: Path) -> None:
+def test_tables_are_read_when_asked_for(directory):
     run = open_run(directory)
     (directory / "every_kind.parquet").unlink()
 
@@ -77,14 +73,14 @@ def test_tables_are_read_when_asked_for(directory: Path) -> None:
     ("name", "message"),
     [("nowhere", "does not exist"), ("file", "is a file"), (".", "no manifest")],
 )
-def test_open_what_is_no_run(tmp_path: Path, name: str, message: str) -> None:
+def test_open_what_is_no_run(tmp_path, name, message):
     (tmp_path / "file").write_text("")
 
     with pytest.raises(RunDirectoryError, match=message):
         open_run(tmp_path / name)
 
 
-def test_truncated_table_is_named_and_the_rest_opens(directory: Path) -> None:
+def test_truncated_table_is_named_and_the_rest_opens(directory):
     path = directory / "every_kind.parquet"
     path.write_bytes(path.read_bytes()[:-100])
 
@@ -95,7 +91,7 @@ def test_truncated_table_is_named_and_the_rest_opens(directory: Path) -> None:
     assert ["every_kind"] == run.verify()
 
 
-def test_verify_sees_flipped_bytes(directory: Path) -> None:
+def test_verify_sees_flipped_bytes(directory):
     path = directory / "every_kind.parquet"
     content = bytearray(path.read_bytes())
     content[200:240] = bytes(40)
@@ -104,7 +100,7 @@ def test_verify_sees_flipped_bytes(directory: Path) -> None:
     assert ["every_kind"] == open_run(directory).verify()
 
 
-def test_verify_sees_a_changed_value_and_not_a_new_layout(directory: Path) -> None:
+def test_verify_sees_a_changed_value_and_not_a_new_layout(directory):
     path = directory / "every_kind.parquet"
     table = open_run(directory).arrow("every_kind")
 
@@ -117,7 +113,7 @@ def test_verify_sees_a_changed_value_and_not_a_new_layout(directory: Path) -> No
     assert ["every_kind"] == open_run(directory).verify()
 
 
-def test_verify_sees_a_changed_manifest(directory: Path) -> None:
+def test_verify_sees_a_changed_manifest(directory):
     path = directory / "manifest.json"
     content = json.loads(path.read_text())
     content["digest"] = "0" * 64
@@ -126,14 +122,14 @@ def test_verify_sees_a_changed_manifest(directory: Path) -> None:
     assert ["manifest.json"] == open_run(directory).verify()
 
 
-def test_missing_rows_are_noted(directory: Path) -> None:
+def test_missing_rows_are_noted(directory):
     path = directory / "every_kind.parquet"
     pq.write_table(pq.read_table(path).slice(0, 299), path)
 
     assert ["table 'every_kind' has 299 rows, but 300 were stored"] == open_run(directory).notes
 
 
-def test_crashed_run_opens_with_what_is_whole(tmp_path: Path) -> None:
+def test_crashed_run_opens_with_what_is_whole(tmp_path):
     store = RunStore(tmp_path / "run", [EVERY_KIND], flush_rows=50)
     store.open()
     store.append("every_kind", **ROWS)
@@ -149,12 +145,12 @@ def test_crashed_run_opens_with_what_is_whole(tmp_path: Path) -> None:
     store.discard()
 
 
-def test_run_before_close_is_refused() -> None:
+def test_run_before_close_is_refused():
     with pytest.raises(ArtifactError, match="not closed yet"):
         open_store(RunStore(None, [EVERY_KIND]))
 
 
-def test_run_says_where_and_how(directory: Path) -> None:
+def test_run_says_where_and_how(directory):
     run: Run = open_run(directory)
 
     assert f"<Run {directory}: complete, tables every_kind>" == repr(run)
@@ -169,9 +165,7 @@ def test_run_says_where_and_how(directory: Path) -> None:
         (lambda t: t.set_column(0, t.column_names[0], t["x"]), "column .* is double"),
     ],
 )
-def test_a_table_with_other_columns_than_were_stored_is_not_read(
-    directory: Path, change: Any, words: str
-) -> None:
+def test_a_table_with_other_columns_than_were_stored_is_not_read(directory, change, words):
     """Pictures and paths expected the columns of the manifest, and ended in tracebacks."""
     path = directory / "every_kind.parquet"
     pq.write_table(change(pq.read_table(path)), path)
@@ -179,6 +173,6 @@ def test_a_table_with_other_columns_than_were_stored_is_not_read(
         open_run(directory).arrow("every_kind")
 
 
-def test_a_table_of_others_is_not_taken_for_one_of_ours() -> None:
+def test_a_table_of_others_is_not_taken_for_one_of_ours():
     with pytest.raises(ArtifactError, match="was not stored by Fleet2D"):
         spec_of(pa.schema([("step", pa.int64())], {"fleet2d.table": "events"}))

@@ -3,7 +3,6 @@
 from dataclasses import fields
 from datetime import timedelta
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -139,25 +138,25 @@ def assert_rebuilt(run: Run, stride: int = 1) -> None:
 
 @pytest.mark.parametrize("bodies", BODIES)
 @pytest.mark.parametrize("step", some(["1 s", "0.5 s", "7 s"], 3))
-def test_every_step_is_rebuilt(bodies: str, step: str) -> None:
+def test_every_step_is_rebuilt(bodies, step):
     assert_rebuilt(run_of(bodies, step=step))
 
 
 @pytest.mark.parametrize("bodies", BODIES)
 @pytest.mark.parametrize("start", ["midday", "evening"])
-def test_run_that_starts_within_a_day_is_rebuilt(bodies: str, start: str) -> None:
+def test_run_that_starts_within_a_day_is_rebuilt(bodies, start):
     assert_rebuilt(run_of(bodies, start))
 
 
 @pytest.mark.parametrize("bodies", BODIES)
 @pytest.mark.parametrize("stride", [7, 60, 10_000])
-def test_every_so_many_steps_is_rebuilt(bodies: str, stride: int) -> None:
+def test_every_so_many_steps_is_rebuilt(bodies, stride):
     assert_rebuilt(run_of(bodies), stride)
 
 
 @pytest.mark.parametrize("bodies", BODIES)
 @pytest.mark.parametrize(("stride", "part"), [(1, 1000), (7, 999), (60, 61), (10_000, 500)])
-def test_parts_of_a_path_are_those_of_the_whole(bodies: str, stride: int, part: int) -> None:
+def test_parts_of_a_path_are_those_of_the_whole(bodies, stride, part):
     run = run_of(bodies)
     every = timedelta(seconds=stride)
     for name in [*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]]:
@@ -173,13 +172,13 @@ def test_parts_of_a_path_are_those_of_the_whole(bodies: str, stride: int, part: 
 
 @pytest.mark.parametrize("bodies", BODIES)
 @pytest.mark.parametrize("span", some([13, 1], 2))
-def test_spans_do_not_show(bodies: str, span: int) -> None:
+def test_spans_do_not_show(bodies, span):
     run = run_of(bodies, "midnight", "1 s", f"simulation.max_span={span}")
     assert_rebuilt(run)
     assert run_of(bodies).digest == run.digest
 
 
-def test_interruptions_happened_and_were_recorded() -> None:
+def test_interruptions_happened_and_were_recorded():
     run = run_of("interrupted by sight")
     keys = run.pandas("key_frames")
     assert (keys["kind"] == "planned").sum() > 10
@@ -189,7 +188,7 @@ def test_interruptions_happened_and_were_recorded() -> None:
 
 @pytest.mark.parametrize("bodies", BODIES)
 @pytest.mark.parametrize("steps", [1, 1234])
-def test_run_that_was_cut_short_is_rebuilt(bodies: str, steps: int) -> None:
+def test_run_that_was_cut_short_is_rebuilt(bodies, steps):
     users, robots = BODIES[bodies]
     simulation = Simulation(
         {
@@ -214,19 +213,19 @@ def test_run_that_was_cut_short_is_rebuilt(bodies: str, steps: int) -> None:
         ("ana", 0.0, "not a multiple of simulation.step"),
     ],
 )
-def test_what_can_not_be_rebuilt_is_told(entity: str, every: float, message: str) -> None:
+def test_what_can_not_be_rebuilt_is_told(entity, every, message):
     run = run_of("schedule with away")
     with pytest.raises(ArtifactError, match=message):
         run.path(entity, every=timedelta(seconds=every))
 
 
-def test_run_without_key_frames_says_so() -> None:
+def test_run_without_key_frames_says_so():
     run = run_of("schedule with away", "midnight", "1 s", "artifacts.key_frames=false")
     with pytest.raises(ArtifactError, match="no key frames"):
         run.path("ana")
 
 
-def test_walk_by_unknown_rules_is_refused_not_guessed() -> None:
+def test_walk_by_unknown_rules_is_refused_not_guessed():
     simulation = {"duration": "3 h", "seed": 1}
     stranger = {"behaviors": [{"type": f"{__name__}:Stranger"}, {"type": "meander"}]}
     scenario = {"simulation": simulation, "floorplan": {"type": "bundled"}}
@@ -237,9 +236,7 @@ def test_walk_by_unknown_rules_is_refused_not_guessed() -> None:
 
 @pytest.mark.parametrize("objects", [{}, {"door": {"type": "door", "doorway": "bathroom_1"}}])
 @pytest.mark.parametrize("at", [(1,), (300,), (3600,), (300, 300, 4000)])
-def test_a_person_who_walks_at_random_can_be_put_elsewhere(
-    objects: Any, at: tuple[int, ...]
-) -> None:
+def test_a_person_who_walks_at_random_can_be_put_elsewhere(objects, at):
     """Before, the stored run couldn't be rebuilt, and so had no picture."""
     simulation = Simulation(
         {
@@ -264,7 +261,7 @@ def test_a_person_who_walks_at_random_can_be_put_elsewhere(
     assert "kitchen" == room.type or len(at) > 1
 
 
-def test_key_frames_out_of_order_are_damaged(tmp_path: Path) -> None:
+def test_key_frames_out_of_order_are_damaged(tmp_path):
     """The kernel's refusal was shown as a traceback."""
     fleet2d.run("bundled:paper", "simulation.duration=2 h", seed=4, out=tmp_path / "run")
     path = tmp_path / "run" / "key_frames.parquet"
@@ -274,7 +271,7 @@ def test_key_frames_out_of_order_are_damaged(tmp_path: Path) -> None:
         fleet2d.open_run(tmp_path / "run").path("astro")
 
 
-def test_times_between_poses_are_durations_or_texts() -> None:
+def test_times_between_poses_are_durations_or_texts():
     run = fleet2d.run("bundled:paper", "simulation.duration=10 min", seed=4)
 
     apart = run.path("ana", every="10 s")

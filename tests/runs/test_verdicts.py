@@ -43,8 +43,6 @@ def run_with(expectations: dict[str, Any], violations: list[tuple[str, int, int]
         ),
     ],
 )
-def test_violated_expectations_are_named_with_their_first_moment(
-    expectations: dict[str, Any], line: str
-) -> None:
+def test_violated_expectations_are_named_with_their_first_moment(expectations, line):
     run = run_with(expectations, [("c", 7, 8), ("b", 9, 9), ("b", 5, 6)])
     assert line == verdict_line(run, verdicts_of(run))

@@ -20,9 +20,7 @@ ALMANAC = [
 
 
 @pytest.mark.parametrize(("city", "latitude", "noon_min", "day", "rise", "fall"), ALMANAC)
-def test_the_sun_rises_and_sets_as_in_almanacs(
-    city: str, latitude: float, noon_min: float, day: str, rise: str, fall: str
-) -> None:
+def test_the_sun_rises_and_sets_as_in_almanacs(city, latitude, noon_min, day, rise, fall):
     sun = Sun(latitude, timedelta(minutes=noon_min))
     moments = sun.day(date.fromisoformat(day).toordinal())
 
@@ -32,7 +30,7 @@ def test_the_sun_rises_and_sets_as_in_almanacs(
 
 
 @pytest.mark.parametrize("latitude", [-65.0, -33.9, 0.0, 23.4, 52.5, 65.0])
-def test_every_day_of_a_year_equals_the_formulas_in_floats(latitude: float) -> None:
+def test_every_day_of_a_year_equals_the_formulas_in_floats(latitude):
     sun, first = Sun(latitude, timedelta(hours=12)), date(2026, 1, 1).toordinal()
     for ordinal in range(first, first + 365, 3):
         n = ordinal - date(2000, 1, 1).toordinal()
@@ -52,7 +50,7 @@ def test_every_day_of_a_year_equals_the_formulas_in_floats(latitude: float) -> N
         assert abs(fall - (noon + timedelta(seconds=half_day))) < slack
 
 
-def test_a_night_lasts_from_sunset_to_sunrise() -> None:
+def test_a_night_lasts_from_sunset_to_sunrise():
     sun = Sun(52.5, timedelta(hours=12))
     ordinal = date(2026, 12, 31).toordinal()
     (rise, fall), (next_rise, next_fall) = sun.day(ordinal), sun.day(ordinal + 1)
@@ -66,7 +64,7 @@ def test_a_night_lasts_from_sunset_to_sunrise() -> None:
     ]
 
 
-def test_the_light_of_day_grows_for_an_hour_about_sunrise() -> None:
+def test_the_light_of_day_grows_for_an_hour_about_sunrise():
     sun = Sun(52.5, timedelta(hours=12))
     rise, fall = sun.day(date(2026, 6, 21).toordinal())
     half = timedelta(minutes=30)

@@ -15,7 +15,7 @@ import fleet2d
 from fleet2d.runtime.determinism import Draws, stream_key, sum_in_order
 
 
-def test_every_seed_path_and_purpose_has_a_stream_of_its_own() -> None:
+def test_every_seed_path_and_purpose_has_a_stream_of_its_own():
     paths = ["users.ana", "users.ben", "users.anax", "robots.ana", ""]
     keys = {
         int(stream_key(*key)) for key in product([0, 1, 4, 2**63 - 1], paths, ["spot", "x", ""])
@@ -23,18 +23,18 @@ def test_every_seed_path_and_purpose_has_a_stream_of_its_own() -> None:
     assert 4 * 5 * 3 == len(keys)
 
 
-def test_names_that_run_into_each_other_are_told_apart() -> None:
+def test_names_that_run_into_each_other_are_told_apart():
     assert stream_key(1, "users.ana", "x") != stream_key(11, "sers.ana", "x")
     assert stream_key(1, "users.a", "nax") != stream_key(1, "users.ana", "x")
 
 
-def test_keys_are_the_same_on_every_machine() -> None:
+def test_keys_are_the_same_on_every_machine():
     assert 0xB2018C82EE74584F == int(stream_key(4, "users.ana", "spot"))
     draws = Draws(stream_key(4, "users.ana", "spot"), 0)
     assert [3, 4, 4, 3, 4] == [draws.below(6) for _ in range(5)]
 
 
-def test_draws_of_one_step_do_not_depend_on_how_many_were_taken_at_another() -> None:
+def test_draws_of_one_step_do_not_depend_on_how_many_were_taken_at_another():
     key = stream_key(4, "users.ana", "spot")
     greedy = Draws(key, 7)
     for _ in range(1000):
@@ -44,7 +44,7 @@ def test_draws_of_one_step_do_not_depend_on_how_many_were_taken_at_another() -> 
     assert [first.below(100) for _ in range(5)] != [Draws(key, 7).below(100) for _ in range(5)]
 
 
-def test_draws_below_are_even() -> None:
+def test_draws_below_are_even():
     counts = np.bincount(
         [Draws(stream_key(1, "p", "q"), step).below(7) for step in range(14_000)], minlength=7
     )
@@ -52,7 +52,7 @@ def test_draws_below_are_even() -> None:
     assert ((counts - 2000) ** 2 / 2000).sum() < 22.5  # chi squared, 6 degrees of freedom, 0.1 %
 
 
-def test_successive_draws_of_one_step_are_even_and_independent() -> None:
+def test_successive_draws_of_one_step_are_even_and_independent():
     draws = Draws(stream_key(1, "p", "q"), 3)
     values = np.array([draws.uniform() for _ in range(10_000)])
     assert 0 <= values.min() < values.max() < 1
@@ -60,7 +60,7 @@ def test_successive_draws_of_one_step_are_even_and_independent() -> None:
     assert abs(np.corrcoef(values[:-1], values[1:])[0, 1]) < 0.03
 
 
-def test_every_order_of_a_shuffle_is_as_likely() -> None:
+def test_every_order_of_a_shuffle_is_as_likely():
     counts: dict[tuple[str, ...], int] = {}
     for step in range(6000):
         order = tuple(Draws(stream_key(2, "p", "q"), step).shuffled("abc"))
@@ -69,13 +69,13 @@ def test_every_order_of_a_shuffle_is_as_likely() -> None:
     assert sum((n - 1000) ** 2 / 1000 for n in counts.values()) < 20.5  # 5 degrees, 0.1 %
 
 
-def test_a_choice_is_one_of_the_items() -> None:
+def test_a_choice_is_one_of_the_items():
     chosen = {Draws(stream_key(2, "p", "q"), step).choice("abc") for step in range(50)}
     assert {"a", "b", "c"} == chosen
 
 
 @pytest.mark.parametrize("bound", [0, -1, 2**31])
-def test_a_bound_that_can_not_be_is_refused(bound: int) -> None:
+def test_a_bound_that_can_not_be_is_refused(bound):
     with pytest.raises(ValueError, match="bound"):
         Draws(stream_key(1, "p", "q"), 0).below(bound)
 
@@ -83,7 +83,7 @@ def test_a_bound_that_can_not_be_is_refused(bound: int) -> None:
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
-def test_floats_are_added_one_after_the_other() -> None:
+def test_floats_are_added_one_after_the_other():
     values = [1e16, 1.0, -1e16, 0.1]
     assert sum_in_order(values) == ((1e16 + 1.0) - 1e16) + 0.1 == 0.1
 
@@ -101,9 +101,7 @@ def test_floats_are_added_one_after_the_other() -> None:
         3,
     ),
 )
-def test_a_run_adds_no_floats_by_the_built_in_sum(
-    scenario: list[Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_adds_no_floats_by_the_built_in_sum(scenario, monkeypatch):
     """The mover's distance of the bundled month had another last digit in Python 3.13 than in 3.11."""
     calls: set[str] = set()
     built_in = builtins.sum

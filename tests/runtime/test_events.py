@@ -48,7 +48,7 @@ print(json.dumps([run.tables["events"]["event"].to_pylist(), run.metrics]))
 """
 
 
-def test_sources_have_no_bare_string_of_an_event_kind() -> None:
+def test_sources_have_no_bare_string_of_an_event_kind():
     paths = set(SOURCES.rglob("*.py")) - {Path(events.__file__)}
 
     bare = [(path.name, *place) for path in paths for place in bare_kinds(path.read_text())]
@@ -68,14 +68,14 @@ def test_sources_have_no_bare_string_of_an_event_kind() -> None:
         'records: ClassVar[frozenset[str]] = frozenset({"visits"})',
     ],
 )
-def test_a_bare_kind_is_noticed(source: str) -> None:
+def test_a_bare_kind_is_noticed(source):
     assert 1 == len(list(bare_kinds(source)))
 
 
 @pytest.mark.parametrize(
     "source", ['table["activity"]', 'plan.note(EventKind.FOUND, "lost")', "shut = 1"]
 )
-def test_other_words_are_no_kinds(source: str) -> None:
+def test_other_words_are_no_kinds(source):
     assert [] == list(bare_kinds(source))
 
 
@@ -109,7 +109,7 @@ def name_of(node: ast.AST) -> str:
 
 
 @pytest.mark.slow
-def test_a_run_with_renamed_kinds_differs_in_their_names_only(tmp_path: Path) -> None:
+def test_a_run_with_renamed_kinds_differs_in_their_names_only(tmp_path):
     run = fleet2d.run("simulation.duration=2 d", "expect=null", seed=3, out=tmp_path / "named")
     kinds = run.tables["events"]["event"].to_pylist()
 

@@ -39,14 +39,14 @@ def clock_of(night: Night, minutes: int = MINUTES) -> Clock:
     return Clock(zone.at(night.begin), 60_000_000, minutes)
 
 
-def test_forty_zones_are_compared() -> None:
+def test_forty_zones_are_compared():
     """In the northern and the southern hemisphere, with two nights each, or none."""
     assert len(ZONES) == len(set(ZONES)) == 40
     assert len(NIGHTS) > 60
 
 
 @pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
-def test_clock_reads_as_the_standard_library_each_minute(night: Night) -> None:
+def test_clock_reads_as_the_standard_library_each_minute(night):
     """Fields, offset and fold; texts, readings and stamps of tables; and each moment of a reading."""
     clock = clock_of(night)
     expected = [night.reading(minute) for minute in range(MINUTES)]
@@ -62,7 +62,7 @@ def test_clock_reads_as_the_standard_library_each_minute(night: Night) -> None:
 
 
 @pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
-def test_written_time_is_the_first_minute_that_reads_so_or_later_after_a_gap(night: Night) -> None:
+def test_written_time_is_the_first_minute_that_reads_so_or_later_after_a_gap(night):
     """Each minute of the local night that one may write, by a search through the real ones."""
     clock = clock_of(night)
     readings = [night.reading(minute).replace(tzinfo=None) for minute in range(MINUTES)]
@@ -81,7 +81,7 @@ def test_written_time_is_the_first_minute_that_reads_so_or_later_after_a_gap(nig
 
 
 @pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
-def test_hours_hold_while_the_clock_reads_a_time_within_them(night: Night) -> None:
+def test_hours_hold_while_the_clock_reads_a_time_within_them(night):
     """Of behaviors and expectations, with their ends and the next begin."""
     clock = clock_of(night)
     ends = MINUTES * clock.step_us
@@ -113,7 +113,7 @@ def test_hours_hold_while_the_clock_reads_a_time_within_them(night: Night) -> No
 
 
 @pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
-def test_hours_days_and_weeks_of_expectations_begin_by_the_clock(night: Night) -> None:
+def test_hours_days_and_weeks_of_expectations_begin_by_the_clock(night):
     """A day that is begun again, as a clock is put back, is the same one; an hour is another."""
     clock = clock_of(night)
     readings = [night.reading(minute).replace(tzinfo=None) for minute in range(MINUTES)]
@@ -135,7 +135,7 @@ def test_hours_days_and_weeks_of_expectations_begin_by_the_clock(night: Night) -
 
 
 @pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
-def test_daily_time_of_a_script_is_once_a_day(night: Night) -> None:
+def test_daily_time_of_a_script_is_once_a_day(night):
     """Also at a time that doesn't exist, or exists twice: then it is the first of both."""
     clock = clock_of(night, 3 * MINUTES)
     readings = [night.reading(minute).replace(tzinfo=None) for minute in range(3 * MINUTES)]
@@ -151,7 +151,7 @@ def test_daily_time_of_a_script_is_once_a_day(night: Night) -> None:
         assert steps - {0} == expected - {0}, text
 
 
-def test_real_time_passes_over_a_change() -> None:
+def test_real_time_passes_over_a_change():
     """Durations, differences and comparisons are of real time; what is written, is read."""
     berlin = zone_of("Europe/Berlin", datetime(2026, 10, 24), datetime(2026, 10, 26))
     before = berlin.at(datetime(2026, 10, 25, 2, 50))
@@ -175,7 +175,7 @@ def test_real_time_passes_over_a_change() -> None:
         assert (again, again.fold, type(again)) == (after, 1, LocalTime)
 
 
-def test_next_midnight_is_later_where_the_clock_reads_it_twice() -> None:
+def test_next_midnight_is_later_where_the_clock_reads_it_twice():
     """In Newfoundland it was put back at 00:01, to 23:01 of the day before."""
     night = nights("America/St_Johns", 2010)[1]
     clock = clock_of(night)
@@ -184,7 +184,7 @@ def test_next_midnight_is_later_where_the_clock_reads_it_twice() -> None:
         assert clock.elapsed(next_midnight(moment)) > minute * clock.step_us
 
 
-def test_zone_is_stored_with_the_offsets_that_were_used() -> None:
+def test_zone_is_stored_with_the_offsets_that_were_used():
     """A run needs no rules of the machine that reads it."""
     zone = zone_of("Europe/Berlin", datetime(2026, 3, 1), datetime(2026, 11, 1))
     assert zone.record == {
@@ -197,7 +197,7 @@ def test_zone_is_stored_with_the_offsets_that_were_used() -> None:
     assert (again.changes_us, again.offsets_us) == (zone.changes_us, zone.offsets_us)
 
 
-def test_new_year_in_the_last_time_zone_comes_at_noon_of_utc() -> None:
+def test_new_year_in_the_last_time_zone_comes_at_noon_of_utc():
     """Days, weeks and years are those of the home."""
     zone = zone_of("Etc/GMT+12", datetime(2026, 12, 31), datetime(2027, 1, 2))
     clock = Clock(zone.at(datetime(2026, 12, 31, 23, 59)), 60_000_000, 3)

@@ -5,7 +5,6 @@ import platform
 import subprocess
 import sys
 import weakref
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ PATROL = {"astro": {"type": "patrol", "dwell": "1 min"}}
 
 
 @pytest.fixture
-def no_collector() -> Iterator[None]:
+def no_collector():
     gc.collect()
     gc.disable()
     yield
@@ -28,7 +27,7 @@ def no_collector() -> Iterator[None]:
 
 
 @pytest.fixture
-def usual() -> Iterator[tuple[int, int, int]]:
+def usual():
     before = gc.get_threshold()
     yield before
     gc.set_threshold(*before)
@@ -38,7 +37,7 @@ def alive() -> int:
     return sum(isinstance(thing, Actor | Plan) for thing in gc.get_objects())
 
 
-def test_what_a_run_was_made_of_is_freed_at_once(no_collector: None) -> None:
+def test_what_a_run_was_made_of_is_freed_at_once(no_collector):
     """A process of many runs grew by half: bodies and plans referred to each other."""
     fleet2d.run(scenario("30 min", robots=PATROL))
     before = alive()
@@ -46,7 +45,7 @@ def test_what_a_run_was_made_of_is_freed_at_once(no_collector: None) -> None:
     assert before == alive()
 
 
-def test_released_memory_is_that_of_garbage_too(no_collector: None) -> None:
+def test_released_memory_is_that_of_garbage_too(no_collector):
     loop: list[object] = [np.ones(10_000)]
     loop.append(loop)
     array = weakref.ref(loop[0])
@@ -55,7 +54,7 @@ def test_released_memory_is_that_of_garbage_too(no_collector: None) -> None:
     assert array() is None
 
 
-def test_thresholds_are_as_before_once_no_run_needs_others(usual: tuple[int, int, int]) -> None:
+def test_thresholds_are_as_before_once_no_run_needs_others(usual):
     with rare_collections():
         assert (OBJECTS, *usual[1:]) == gc.get_threshold()
         with rare_collections():
@@ -65,16 +64,14 @@ def test_thresholds_are_as_before_once_no_run_needs_others(usual: tuple[int, int
 
 
 @pytest.mark.parametrize("own", [0, 2 * OBJECTS])
-def test_a_user_who_wants_fewer_collections_keeps_them(
-    usual: tuple[int, int, int], own: int
-) -> None:
+def test_a_user_who_wants_fewer_collections_keeps_them(usual, own):
     gc.set_threshold(own, 5, 5)
     with rare_collections():
         assert (own, 5, 5) == gc.get_threshold()
     assert (own, 5, 5) == gc.get_threshold()
 
 
-def test_modules_are_left_out_of_collections_only_in_a_process_with_few_objects() -> None:
+def test_modules_are_left_out_of_collections_only_in_a_process_with_few_objects():
     code = """
 import gc, sys
 objects = [[] for _ in range(int(sys.argv[1]))]
@@ -88,7 +85,7 @@ print(gc.get_freeze_count() > 10_000, gc.get_threshold()[0])
         assert f"{is_frozen} 700" == done.stdout.strip()
 
 
-def test_objects_of_a_failed_import_are_collected_as_usual(usual: tuple[int, int, int]) -> None:
+def test_objects_of_a_failed_import_are_collected_as_usual(usual):
     frozen = gc.get_freeze_count()
     with pytest.raises(ImportError), library_imports():
         raise ImportError
@@ -97,7 +94,7 @@ def test_objects_of_a_failed_import_are_collected_as_usual(usual: tuple[int, int
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
-def test_memory_of_freed_arrays_is_used_again_without_new_pages() -> None:
+def test_memory_of_freed_arrays_is_used_again_without_new_pages():
     code = """
 import resource, sys
 import numpy as np
@@ -114,7 +111,7 @@ print(faults[1] - faults[0])
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux counts the parent's memory, too")
-def test_peak_memory_is_not_that_of_the_process_that_started_this_one() -> None:
+def test_peak_memory_is_not_that_of_the_process_that_started_this_one():
     """Workers of a driver with much memory were replaced after each call."""
     code = """
 import subprocess, sys

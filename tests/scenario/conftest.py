@@ -87,7 +87,7 @@ STAND_INS: dict[str, dict[str, type[Component]]] = {
 
 
 @pytest.fixture
-def stand_ins(monkeypatch: pytest.MonkeyPatch) -> None:
+def stand_ins(monkeypatch):
     """Let the stand-ins be all the components that there are."""
     monkeypatch.setattr(components, "_plugins", lambda kind: EntryPoints())
     for kind in COMPONENTS:

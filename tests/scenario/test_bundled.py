@@ -5,7 +5,6 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from jsonschema.protocols import Validator
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.scenario.compose import BUNDLED, ENTRIES
@@ -28,19 +27,19 @@ EXAMPLES = sorted(
 
 
 @pytest.fixture(scope="module")
-def validator() -> Validator:
+def validator():
     """Whether the schema itself is valid is asked once, by the tests of the command line."""
     return jsonschema.validators.validator_for(schema())(schema())
 
 
 @pytest.mark.parametrize("file", [*sorted(BUNDLED.glob("*.yaml")), *EXAMPLES], ids=lambda f: f.stem)
-def test_file_that_we_ship_conforms_to_the_schema(file: Path, validator: Validator) -> None:
+def test_file_that_we_ship_conforms_to_the_schema(file, validator):
     written = json.dumps(read_document(file).data, default=str)  # an editor sees dates as text
     validator.validate(json.loads(written))
 
 
 @pytest.mark.parametrize("file", sorted(BUNDLED.glob("*.yaml")), ids=lambda file: file.stem)
-def test_bundled_scenario_loads(file: Path) -> None:
+def test_bundled_scenario_loads(file):
     scenario = load_scenario(f"bundled:{file.stem}")
 
     again = load_scenario(scenario.resolved())
@@ -49,7 +48,7 @@ def test_bundled_scenario_loads(file: Path) -> None:
     assert scenario.model_copy(update=without) == again.model_copy(update=without)
 
 
-def test_paper_scenario_has_its_numbers() -> None:
+def test_paper_scenario_has_its_numbers():
     scenario = load_scenario("bundled:paper")
 
     assert 30 * 86_400 == scenario.simulation.steps
@@ -57,7 +56,7 @@ def test_paper_scenario_has_its_numbers() -> None:
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_any_plan_goes_under_the_paper_scenario(shared_data: Path, order: int) -> None:
+def test_any_plan_goes_under_the_paper_scenario(shared_data, order):
     plan = sorted((shared_data / "houseexpo").glob("*.json"))[0]
     overrides = ["floorplan.type=houseexpo", f"floorplan.path={plan}"][::order]
     scenario = load_scenario("bundled:paper", *overrides, "simulation.duration.days=7")
@@ -66,7 +65,7 @@ def test_any_plan_goes_under_the_paper_scenario(shared_data: Path, order: int) -
     assert 7 == scenario.simulation.duration.days
 
 
-def test_resolved_scenario_conforms_to_the_schema(validator: Validator) -> None:
+def test_resolved_scenario_conforms_to_the_schema(validator):
     resolved = load_scenario("bundled:paper").resolved()
 
     assert set(ENTRIES) < set(resolved)
@@ -82,6 +81,6 @@ def test_resolved_scenario_conforms_to_the_schema(validator: Validator) -> None:
         {"robots": {"astro": "meandr"}},
     ],
 )
-def test_schema_refuses_what_loading_refuses(wrong: object, validator: Validator) -> None:
+def test_schema_refuses_what_loading_refuses(wrong, validator):
     with pytest.raises(jsonschema.ValidationError):
         validator.validate(wrong)

@@ -60,11 +60,11 @@ BASE: dict[str, Any] = {
          {**BASE["users"], "ana": {**BASE["users"]["ana"], "color": "#d62728"}}),
     ],
 )  # fmt: skip
-def test_overrides_change_a_scenario(overrides: list[str], section: str, expected: object) -> None:
+def test_overrides_change_a_scenario(overrides, section, expected):
     assert expected == compose(BASE, overrides).data.get(section)
 
 
-def test_composition_leaves_its_source_as_it_was() -> None:
+def test_composition_leaves_its_source_as_it_was():
     before = repr(BASE)
     compose(BASE, ["floorplan.type=empty", "users.ana=null", "robots.astro.behaviors.0=tour"])
 
@@ -90,7 +90,7 @@ def test_composition_leaves_its_source_as_it_was() -> None:
         ("metrics.tally.of=x", "there is no metrics.tally. There are: none; to add one"),
     ],
 )  # fmt: skip
-def test_override_that_makes_no_sense_is_refused(override: str, message: str) -> None:
+def test_override_that_makes_no_sense_is_refused(override, message):
     with pytest.raises(ScenarioError) as caught:
         compose(BASE, [override])
     assert message in str(caught.value)
@@ -104,7 +104,7 @@ def write(folder: Path, **files: str) -> Path:
     return folder
 
 
-def test_files_extend_files(tmp_path: Path) -> None:
+def test_files_extend_files(tmp_path):
     write(tmp_path, base="simulation: {seed: 1, step: 1 s}\nusers: {ana: drift, ben: drift}")
     write(tmp_path, night="simulation: {start: 2026-01-05T22:00:00}")
     write(
@@ -118,7 +118,7 @@ def test_files_extend_files(tmp_path: Path) -> None:
     assert {"ben": "drift"} == data["users"]
 
 
-def test_extended_file_can_change_a_type(tmp_path: Path) -> None:
+def test_extended_file_can_change_a_type(tmp_path):
     write(tmp_path, base="floorplan: {type: houseexpo, path: plan.json, cell: 0.1}")
     write(tmp_path, home="extends: base.yaml\nfloorplan: {type: empty, width: 3}")
 
@@ -127,9 +127,7 @@ def test_extended_file_can_change_a_type(tmp_path: Path) -> None:
     ]
 
 
-def test_class_that_stays_the_same_is_not_imported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_class_that_stays_the_same_is_not_imported(tmp_path, monkeypatch):
     write(tmp_path, base="floorplan: {type: 'mine:House', width: 3}")
     write(tmp_path, home="extends: base.yaml\nfloorplan: {type: 'mine:House', cell: 0.1}")
     looked_up: list[str] = []
@@ -141,9 +139,7 @@ def test_class_that_stays_the_same_is_not_imported(
     assert [] == looked_up
 
 
-def test_text_keeps_the_folder_of_the_file_it_came_from(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_text_keeps_the_folder_of_the_file_it_came_from(tmp_path, monkeypatch):
     write(tmp_path / "a", base="floorplan: {type: houseexpo, path: plan.json}\nname: x")
     write(tmp_path / "b", home="extends: ../a/base.yaml\nname: y")
     monkeypatch.chdir(tmp_path)
@@ -154,7 +150,7 @@ def test_text_keeps_the_folder_of_the_file_it_came_from(
     assert tmp_path == data["floorplan"]["note"].folder
 
 
-def test_places_follow_what_was_merged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_follow_what_was_merged(tmp_path, monkeypatch):
     write(tmp_path, base="simulation:\n  seed: 1\n  step: 1 s\nusers: {ana: drift}")
     write(tmp_path, home="extends: base.yaml\nsimulation:\n  seed: 2")
     monkeypatch.chdir(tmp_path)
@@ -168,14 +164,14 @@ def test_places_follow_what_was_merged(tmp_path: Path, monkeypatch: pytest.Monke
     assert "argument speedup=3" == document.place(("simulation", "speedup"))
 
 
-def test_entry_left_empty_by_mistake_is_not_dropped_silently(tmp_path: Path) -> None:
+def test_entry_left_empty_by_mistake_is_not_dropped_silently(tmp_path):
     write(tmp_path, home="metrics:\n  tally:\n")
 
     with pytest.raises(ScenarioError, match=r"home.yaml:2: metrics.tally: null deletes an entry"):
         compose(tmp_path / "home.yaml")
 
 
-def test_cycle_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cycle_is_named(tmp_path, monkeypatch):
     write(tmp_path, a="extends: b.yaml", b="extends: c.yaml", c="name: x\nextends: [a.yaml]")
     monkeypatch.chdir(tmp_path)
 
@@ -195,9 +191,7 @@ def test_cycle_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
         ("bundled:bse", "home.yaml:1: extends: no scenario 'bse' is bundled: did you mean 'base'?"),
     ],
 )
-def test_extending_what_is_not_there_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, extends: str, message: str
-) -> None:
+def test_extending_what_is_not_there_is_refused(tmp_path, monkeypatch, extends, message):
     monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path / "bundled", base="name: x"))
     monkeypatch.chdir(write(tmp_path, home=f"extends: {extends}"))
 
@@ -206,7 +200,7 @@ def test_extending_what_is_not_there_is_refused(
     assert message in str(caught.value)
 
 
-def test_the_former_name_of_the_papers_scenario_leads_to_its_name_of_today() -> None:
+def test_the_former_name_of_the_papers_scenario_leads_to_its_name_of_today():
     with pytest.raises(
         ScenarioError, match=r"^no scenario 'base' is bundled: write bundled:paper$"
     ):
@@ -215,15 +209,13 @@ def test_the_former_name_of_the_papers_scenario_leads_to_its_name_of_today() -> 
 
 
 @pytest.mark.parametrize("source", [None, "bundled:family", {"extends": "bundled:family"}])
-def test_bundled_scenario_is_found_by_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: Any
-) -> None:
+def test_bundled_scenario_is_found_by_name(tmp_path, monkeypatch, source):
     monkeypatch.setattr(compose_module, "BUNDLED", write(tmp_path, family="artifacts: {a: 1}"))
 
     assert {"artifacts": {"a": 1}} == compose(source).data
 
 
-def test_name_is_not_inherited(tmp_path: Path) -> None:
+def test_name_is_not_inherited(tmp_path):
     write(tmp_path, base="name: base\nusers: {ana: drift}", home="extends: base.yaml")
     write(tmp_path, own="extends: base.yaml\nname: mine")
 
@@ -232,7 +224,7 @@ def test_name_is_not_inherited(tmp_path: Path) -> None:
     assert "base" == compose(tmp_path / "base.yaml", ["users.ana.sigma=1"]).data["name"]
 
 
-def test_setting_inside_an_entry_that_is_not_there_is_refused() -> None:
+def test_setting_inside_an_entry_that_is_not_there_is_refused():
     with pytest.raises(ScenarioError, match=r"there is no robots.asto: did you mean 'astro'"):
         compose(BASE, (), {("robots", "asto", "speed"): 0.3})
 
@@ -248,7 +240,7 @@ def test_setting_inside_an_entry_that_is_not_there_is_refused() -> None:
         (["robots={bolt: {}}", "robots.bolt.speed=1"], {"speed": 1}),
     ],
 )
-def test_override_adds_an_entry_that_it_declares(overrides: list[str], entry: object) -> None:
+def test_override_adds_an_entry_that_it_declares(overrides, entry):
     assert entry == compose(BASE, overrides).data["robots"]["bolt"]
 
 
@@ -268,5 +260,5 @@ def test_override_adds_an_entry_that_it_declares(overrides: list[str], entry: ob
         ("simulation", None),
     ],
 )
-def test_kind_of_a_component_is_that_of_its_place(path: str, kind: str | None) -> None:
+def test_kind_of_a_component_is_that_of_its_place(path, kind):
     assert kind == kind_at(Scenario, path.split("."))

@@ -38,7 +38,7 @@ class Own(Component):
 
 
 @pytest.fixture
-def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def home(tmp_path, monkeypatch):
     folder = tmp_path / "homes"
     folder.mkdir()
     (folder / "home.yaml").write_text(HOME)
@@ -58,7 +58,7 @@ def said(source: Any, *overrides: str, **settings: Any) -> str:
     return str(caught.value)
 
 
-def test_simulation_defaults() -> None:
+def test_simulation_defaults():
     settings = simulation()
 
     assert datetime(2026, 1, 5) == settings.start
@@ -66,16 +66,16 @@ def test_simulation_defaults() -> None:
     assert (None, None, None) == (settings.seed, settings.max_span, settings.speedup)
 
 
-def test_run_stops_at_the_last_full_step() -> None:
+def test_run_stops_at_the_last_full_step():
     assert 3 == simulation(duration="10 s", step="3 s").steps
 
 
 @pytest.mark.parametrize("start", [date(2026, 1, 5), "2026-01-05", "2026-01-05T00:00"])
-def test_start_is_a_date_or_a_date_and_time(start: object) -> None:
+def test_start_is_a_date_or_a_date_and_time(start):
     assert datetime(2026, 1, 5) == simulation(start=start).start
 
 
-def test_loaded_scenario_is_what_the_file_says(home: Path) -> None:
+def test_loaded_scenario_is_what_the_file_says(home):
     scenario = load_scenario(home)
 
     assert timedelta(days=30) == scenario.simulation.duration
@@ -88,16 +88,14 @@ def test_loaded_scenario_is_what_the_file_says(home: Path) -> None:
     assert home.parent == scenario.folder
 
 
-def test_relative_paths_start_from_the_file_and_dump_as_absolute(home: Path) -> None:
+def test_relative_paths_start_from_the_file_and_dump_as_absolute(home):
     assert (
         str(home.parent / "plan.json")
         == load_scenario("homes/home.yaml").resolved()["floorplan"]["path"]
     )
 
 
-def test_resolved_scenario_reloads_to_an_equal_one(
-    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_resolved_scenario_reloads_to_an_equal_one(home, tmp_path, monkeypatch):
     scenario = load_scenario(home)
     resolved = json.loads(json.dumps(scenario.resolved()))
     (tmp_path / "elsewhere").mkdir()
@@ -109,7 +107,7 @@ def test_resolved_scenario_reloads_to_an_equal_one(
     assert scenario == copy.deepcopy(scenario)
 
 
-def test_scenario_is_a_source_too(home: Path) -> None:
+def test_scenario_is_a_source_too(home):
     scenario = load_scenario(home)
     changed = load_scenario(scenario, "users.ana=null", seed=5, name="night")
 
@@ -118,7 +116,7 @@ def test_scenario_is_a_source_too(home: Path) -> None:
     assert home.parent == changed.folder
 
 
-def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
+def test_keywords_are_simulation_settings_and_sections(home):
     scenario = load_scenario(
         home, "simulation.seed=1", seed=2, duration=timedelta(hours=1), robots=None
     )
@@ -162,16 +160,14 @@ def test_keywords_are_simulation_settings_and_sections(home: Path) -> None:
         (["sumulation.seed=1"], "sumulation: unknown key 'sumulation': did you mean 'simulation'?"),
     ],
 )  # fmt: skip
-def test_override_error_says_where_and_what(
-    home: Path, overrides: list[str], line: str | None
-) -> None:
+def test_override_error_says_where_and_what(home, overrides, line):
     if line is None:
         assert load_scenario(home, *overrides)
     else:
         assert f"override '{overrides[-1]}': {line}" in said(home, *overrides)
 
 
-def test_all_errors_of_a_file_are_told_with_their_lines(home: Path) -> None:
+def test_all_errors_of_a_file_are_told_with_their_lines(home):
     home.write_text(HOME.replace("30 cm", "wide").replace("margin: 95 %", "margn: 1"))
 
     assert said("homes/home.yaml").splitlines() == [
@@ -182,27 +178,25 @@ def test_all_errors_of_a_file_are_told_with_their_lines(home: Path) -> None:
     ]
 
 
-def test_unknown_keyword_is_refused(home: Path) -> None:
+def test_unknown_keyword_is_refused(home):
     assert "unknown argument 'sed': did you mean 'seed'? There are: start," in said(home, sed=3)
 
 
-def test_empty_scenario_names_what_is_missing() -> None:
+def test_empty_scenario_names_what_is_missing():
     assert said({}).splitlines() == [
         "simulation: missing, and has no default",
         "floorplan: missing, and has no default",
     ]
 
 
-def test_scenario_is_frozen(home: Path) -> None:
+def test_scenario_is_frozen(home):
     scenario: Scenario = load_scenario(home)
 
     with pytest.raises(ValueError, match="frozen"):
         scenario.name = "x"
 
 
-def test_where_says_where_a_key_was_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_says_where_a_key_was_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("home.yaml").write_text(
         "simulation: {duration: 1 h}\nfloorplan: empty\nusers:\n  ana:\n    type: tour\n"

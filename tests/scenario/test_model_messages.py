@@ -2,7 +2,7 @@
 
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import pytest
 from pydantic import Field, ValidationError, model_validator
@@ -71,7 +71,7 @@ class Outer(Settings):
                                  "Allowed here: size"),
     ],
 )  # fmt: skip
-def test_error_says_where_and_what(data: dict[str, Any], said: str) -> None:
+def test_error_says_where_and_what(data, said):
     document = Document(data, {(): "a.yaml:1", ("inner",): "a.yaml:2"})
 
     with pytest.raises(ValidationError) as caught:
@@ -79,7 +79,7 @@ def test_error_says_where_and_what(data: dict[str, Any], said: str) -> None:
     assert said == str(explain(caught.value, document))
 
 
-def test_unlisted_error_is_told_in_pydantics_words() -> None:
+def test_unlisted_error_is_told_in_pydantics_words():
     assert "Odd" == describe({"type": "odd", "loc": (), "msg": "Odd", "input": 3})
 
 
@@ -99,8 +99,8 @@ def test_unlisted_error_is_told_in_pydantics_words() -> None:
     ],
 )
 def test_what_an_override_broke_is_not_blamed_on_the_file_alone(
-    override: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    override, said, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     Path("low.yaml").write_text(
         "simulation: {duration: {days: 1}}\nfloorplan: bundled\n"
@@ -111,9 +111,7 @@ def test_what_an_override_broke_is_not_blamed_on_the_file_alone(
     assert str(caught.value).startswith(said)
 
 
-def test_what_a_file_broke_in_the_one_that_it_extends_names_both(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_file_broke_in_the_one_that_it_extends_names_both(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("low.yaml").write_text(
         "simulation: {duration: {days: 1}}\nfloorplan: bundled\nalgorithms:\n"

@@ -1,7 +1,6 @@
 """The JSON Schema for editors and the list of components."""
 
 import json
-from typing import Any
 
 import pytest
 
@@ -11,22 +10,22 @@ pytestmark = pytest.mark.usefixtures("stand_ins")
 
 
 @pytest.fixture
-def written() -> dict[str, Any]:
+def written():
     return schema()
 
 
-def test_schema_is_json_and_refuses_unknown_keys(written: dict[str, Any]) -> None:
+def test_schema_is_json_and_refuses_unknown_keys(written):
     assert written == json.loads(json.dumps(written))
     assert written["additionalProperties"] is False
     assert "extends" in written["properties"]
 
 
-def test_schema_requires_nothing_that_an_extended_file_may_give(written: dict[str, Any]) -> None:
+def test_schema_requires_nothing_that_an_extended_file_may_give(written):
     assert "required" not in written
     assert "required" not in written["$defs"]["SimulationSettings"]
 
 
-def test_schema_completes_the_short_form(written: dict[str, Any]) -> None:
+def test_schema_completes_the_short_form(written):
     user = written["properties"]["users"]["additionalProperties"]["anyOf"]
     tour = next(form for form in user[0]["anyOf"] if form.get("title") == "tour")
 
@@ -36,7 +35,7 @@ def test_schema_completes_the_short_form(written: dict[str, Any]) -> None:
     assert "null" == user[1]["type"]
 
 
-def test_schema_offers_every_type_and_its_bare_name(written: dict[str, Any]) -> None:
+def test_schema_offers_every_type_and_its_bare_name(written):
     plans = written["$defs"]["floorplan"]["anyOf"]
 
     assert {"const": "houseexpo"} == written["$defs"]["File"]["properties"]["type"]
@@ -44,11 +43,11 @@ def test_schema_offers_every_type_and_its_bare_name(written: dict[str, Any]) -> 
     assert {"type": "string", "enum": ["empty", "houseexpo"]} in plans
 
 
-def test_component_that_holds_its_own_kind_refers_to_it(written: dict[str, Any]) -> None:
+def test_component_that_holds_its_own_kind_refers_to_it(written):
     assert "#/$defs/algorithm" == written["$defs"]["Smooth"]["properties"]["inner"]["$ref"]
 
 
-def test_every_reference_of_the_schema_resolves(written: dict[str, Any]) -> None:
+def test_every_reference_of_the_schema_resolves(written):
     references = json.dumps(written).split('"#/$defs/')[1:]
 
     for reference in {text.partition('"')[0] for text in references}:
@@ -57,7 +56,7 @@ def test_every_reference_of_the_schema_resolves(written: dict[str, Any]) -> None
             place = place[key]
 
 
-def test_keys_that_types_inherit_are_described_once() -> None:
+def test_keys_that_types_inherit_are_described_once():
     described = {(d.kind, d.type): d for d in describe_components()}
 
     for name in ("drift", "tour"):
@@ -68,14 +67,14 @@ def test_keys_that_types_inherit_are_described_once() -> None:
     assert ("BodySettings", "Entity") == described["scenario", "Robot"].shares
 
 
-def test_schema_refers_to_inherited_keys(written: dict[str, Any]) -> None:
+def test_schema_refers_to_inherited_keys(written):
     properties = written["$defs"]["Tour"]["properties"]
 
     assert {"$ref": "#/$defs/Behavior/properties/when"} == properties["when"]
     assert "The hours" in written["$defs"]["Behavior"]["properties"]["when"]["description"]
 
 
-def test_components_are_described_with_units_and_defaults() -> None:
+def test_components_are_described_with_units_and_defaults():
     described = {(d.kind, d.type): d for d in describe_components()}
     plan = described["floorplan", "houseexpo"]
     tour = described["behavior", "tour"]

@@ -24,7 +24,7 @@ POINTS = 300
 
 
 @pytest.fixture(scope="module")
-def home() -> Home:
+def home():
     return Home(fleet2d.load_floorplan(flat_path()))
 
 
@@ -54,7 +54,7 @@ def some_reaches() -> list[Reach]:
     return [Reach(0, 3000**2, 1229), Reach(200**2, 6000**2, 3000), Reach(0, 10**10, 4096)]
 
 
-def test_methods_agree_on_every_point(home: Home) -> None:
+def test_methods_agree_on_every_point(home):
     rng = np.random.default_rng(6)
     low, high = (0, 0), (SUB * home.plan.lattice.columns, SUB * home.plan.lattice.rows)
     methods = exact_methods()
@@ -74,7 +74,7 @@ def test_methods_agree_on_every_point(home: Home) -> None:
     assert seen > 1000
 
 
-def test_methods_agree_on_cells_and_flashlight_on_their_centres(home: Home) -> None:
+def test_methods_agree_on_cells_and_flashlight_on_their_centres(home):
     flashlight = Flashlight()
     rows, columns = np.indices(home.plan.free.shape)
     centres = np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.int64) * SUB + 33
@@ -89,9 +89,7 @@ def test_methods_agree_on_cells_and_flashlight_on_their_centres(home: Home) -> N
             assert np.array_equal(in_view, flashlight.sees(home, *pose, reach, nearby))
 
 
-def test_flashlight_stays_within_its_memory_and_gives_the_same_results(
-    home: Home, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_flashlight_stays_within_its_memory_and_gives_the_same_results(home, monkeypatch):
     small = Flashlight()
     large = Flashlight()
     poses = some_poses(home, 60)
@@ -105,7 +103,7 @@ def test_flashlight_stays_within_its_memory_and_gives_the_same_results(
     assert 1 <= len(small._cache) < len(large._cache) <= len(set(poses))
 
 
-def test_every_method_follows_a_door() -> None:
+def test_every_method_follows_a_door():
     free = shapely.union_all(
         [shapely.box(0, 0, 2, 3), shapely.box(2.1, 0, 5, 3), shapely.box(2, 1, 2.1, 1.9)]
     )
@@ -130,7 +128,7 @@ def test_every_method_follows_a_door() -> None:
         ({"type": "flashlight", "keep": 4}, "keep"),
     ],
 )
-def test_wrong_method_is_an_error_that_names_the_key(settings: dict[str, Any], why: str) -> None:
+def test_wrong_method_is_an_error_that_names_the_key(settings, why):
     with pytest.raises(InputError, match=why) as caught:
         fleet2d.load_scenario("bundled:paper", sight={"method": settings})
     assert "sight.method" in str(caught.value)
@@ -143,7 +141,7 @@ class XRay(FieldOfView):
         return np.ones(len(points), np.bool_)
 
 
-def test_own_method_needs_only_visible(home: Home) -> None:
+def test_own_method_needs_only_visible(home):
     pose, reach = some_poses(home, 1)[0], some_reaches()[0]
     cells = XRay().cells(home, *pose, reach)
 
@@ -151,7 +149,7 @@ def test_own_method_needs_only_visible(home: Home) -> None:
     assert {"flashlight", "line_of_sight", "visibility_polygon"} <= set(components("sight"))
 
 
-def test_flashlight_uses_the_memory_that_it_reports(home: Home) -> None:
+def test_flashlight_uses_the_memory_that_it_reports(home):
     flashlight, reach = Flashlight(), Reach(0, 5760**2, 1229)
     poses = [(x, y, heading) for x, y, heading in some_poses(home, 400) if x > 0]
     flashlight.cells(home, *poses[0], reach)

@@ -46,18 +46,18 @@ def check_by(values: F64, edges: npt.ArrayLike, hits: Bool, expected: F64) -> No
 TABLE = [[1, 0.95], [3, 0.8], [4, 0.3], [8, 0.1]]
 
 
-def test_detection_falls_with_distance_like_its_table() -> None:
+def test_detection_falls_with_distance_like_its_table():
     hits = noticed(Watch(around(DISTANCE, BEARING), perception={"detection": {"distance": TABLE}}))
     check_by(DISTANCE, range(1, 9), hits, np.interp(DISTANCE, *np.array(TABLE).T))
 
 
-def test_detection_falls_with_distance_like_its_logistic() -> None:
+def test_detection_falls_with_distance_like_its_logistic():
     curve = {"midpoint": 4, "width": 0.6, "top": 0.9}
     hits = noticed(Watch(around(DISTANCE, BEARING), perception={"detection": {"distance": curve}}))
     check_by(DISTANCE, range(1, 9), hits, 0.9 / (1 + np.exp((DISTANCE - 4) / 0.6)))
 
 
-def test_detection_can_differ_left_and_right_of_the_axis() -> None:
+def test_detection_can_differ_left_and_right_of_the_axis():
     """Left, counter-clockwise, is positive: a sign error would swap 0.9 and 0.2."""
     table = [[-60, 0.2], [0, 0.5], [60, 0.9]]
     watch = Watch(around(DISTANCE, BEARING), perception={"detection": {"bearing": table}})
@@ -66,7 +66,7 @@ def test_detection_can_differ_left_and_right_of_the_axis() -> None:
 
 
 @pytest.mark.parametrize("heading", [90.0, 200.0])
-def test_bearing_is_from_where_the_camera_looks(heading: float) -> None:
+def test_bearing_is_from_where_the_camera_looks(heading):
     robot = np.tile([SIDE_M / 2, SIDE_M / 2, heading - 30], (N, 1))
     table = [[-60, 0.1], [60, 0.9]]
     watch = Watch(
@@ -80,14 +80,14 @@ def test_bearing_is_from_where_the_camera_looks(heading: float) -> None:
     check_by(off_axis, [-90, -45, 0, 45, 90], noticed(watch), expected)
 
 
-def test_a_curve_of_bearing_without_negative_angles_is_used_for_both_sides() -> None:
+def test_a_curve_of_bearing_without_negative_angles_is_used_for_both_sides():
     table = [[0, 0.9], [54, 0.2]]
     watch = Watch(around(DISTANCE, BEARING), perception={"detection": {"bearing": table}})
     expected = np.interp(np.abs(BEARING), *np.array(table, float).T)
     check_by(BEARING, [-90, -45, -20, 0, 20, 45, 90], noticed(watch), expected)
 
 
-def test_detection_falls_as_the_user_turns_away() -> None:
+def test_detection_falls_as_the_user_turns_away():
     """0 degrees is a face turned to the camera, 180 a back."""
     table = [[0, 0.9], [90, 0.5], [180, 0.3]]
     watch = Watch(
@@ -98,7 +98,7 @@ def test_detection_falls_as_the_user_turns_away() -> None:
     check_by(away, [30, 60, 90, 120, 150], noticed(watch), expected)
 
 
-def test_detection_depends_on_posture() -> None:
+def test_detection_depends_on_posture():
     posture = RNG.integers(0, 3, (1, N)).astype(np.int8)
     shares = {"sit": 0.7, "lie": 0.2}
     watch = Watch(
@@ -109,7 +109,7 @@ def test_detection_depends_on_posture() -> None:
         assert agree(hits[posture[0] == code], share)
 
 
-def test_detection_follows_the_light_of_the_day() -> None:
+def test_detection_follows_the_light_of_the_day():
     """From Monday 18:00 on, a look every ten minutes, past midnight more than once."""
     table = [[6, 0.2], [8, 1.0], [20, 1.0], [22, 0.2]]
     watch = Watch(
@@ -126,7 +126,7 @@ def test_detection_follows_the_light_of_the_day() -> None:
 
 
 @pytest.mark.slow
-def test_detection_falls_with_the_part_of_a_body_that_a_pillar_hides() -> None:
+def test_detection_falls_with_the_part_of_a_body_that_a_pillar_hides():
     count = 12
     users = around(RNG.uniform(3, 5, N // 4), RNG.uniform(0, 35, N // 4))
     watch = Watch(
@@ -152,7 +152,7 @@ def test_detection_falls_with_the_part_of_a_body_that_a_pillar_hides() -> None:
     check_by(share[free], [0.01, 0.3, 0.6, 0.99], hits[free], 0.8 * share[free])
 
 
-def test_all_factors_multiply() -> None:
+def test_all_factors_multiply():
     posture = RNG.integers(0, 2, (1, N)).astype(np.int8)
     detection = {
         "distance": [[0, 1], [9, 0.4]],
@@ -179,9 +179,7 @@ def test_all_factors_multiply() -> None:
 
 
 @pytest.mark.parametrize(("memory", "period", "step_s"), [(20, 1, 1), (20, 3, 0.5), (0.8, 1, 0.1)])
-def test_misses_are_correlated_with_their_time_constant(
-    memory: float, period: int, step_s: float
-) -> None:
+def test_misses_are_correlated_with_their_time_constant(memory, period, step_s):
     """The chance to stay as before is that of a two-state Markov chain."""
     still = np.full(N, 3.0)
     watch = Watch(
@@ -199,7 +197,7 @@ def test_misses_are_correlated_with_their_time_constant(
     assert agree(hits[:: int(12 * memory / (period * step_s))], 0.6)
 
 
-def test_attention_fades_while_a_user_is_out_of_view() -> None:
+def test_attention_fades_while_a_user_is_out_of_view():
     """Looks come in pairs a second apart, with gaps of 30 s."""
     distance = np.full(N, 50.0)
     distance[::31] = distance[1::31] = 3
@@ -215,7 +213,7 @@ def test_attention_fades_while_a_user_is_out_of_view() -> None:
         assert agree((before == after[: len(before)]), stay + (1 - stay) * 0.5)
 
 
-def test_misses_of_two_users_are_independent() -> None:
+def test_misses_of_two_users_are_independent():
     still = np.full(N, 3.0)
     users = np.concatenate([around(still, 0 * still), around(still, 90 + 0 * still)])
     watch = Watch(users, camera={"detection": 0.5}, perception={"detection": {"memory": "1 s"}})
@@ -240,7 +238,7 @@ def ghosts(**more: Any) -> I64:
     return rows
 
 
-def test_false_positives_come_at_their_rate() -> None:
+def test_false_positives_come_at_their_rate():
     rows = ghosts(perception={"false_positives": {"per_hour": 900}})
     assert abs(len(rows) - N * 0.25) < 4.5 * np.sqrt(N * 0.25)
     per_step = np.bincount(rows[:, Column.STEP], minlength=N)
@@ -248,7 +246,7 @@ def test_false_positives_come_at_their_rate() -> None:
         assert agree(per_step == count, share)
 
 
-def test_false_positives_come_at_their_rate_whatever_the_period_and_the_step() -> None:
+def test_false_positives_come_at_their_rate_whatever_the_period_and_the_step():
     rows = ghosts(
         camera={"period": "2 s"}, perception={"false_positives": {"per_hour": 900}}, step_s=0.5
     )
@@ -257,7 +255,7 @@ def test_false_positives_come_at_their_rate_whatever_the_period_and_the_step() -
     assert (rows[:, Column.STEP] % 4 == 0).all()
 
 
-def test_false_positives_are_uniform_over_the_view() -> None:
+def test_false_positives_are_uniform_over_the_view():
     rows = ghosts(perception={"false_positives": {"per_hour": 1800}}, walls=hall(PILLAR))
     xy = rows[:, [Column.X, Column.Y]] / UNITS_PER_M
     eye = np.array([SIDE_M / 2] * 2)
@@ -283,7 +281,7 @@ def test_false_positives_are_uniform_over_the_view() -> None:
         assert agree(inside, area.mean(), z=5)
 
 
-def test_false_positives_at_a_spot_occur_only_while_it_is_in_view() -> None:
+def test_false_positives_at_a_spot_occur_only_while_it_is_in_view():
     robot = np.tile([SIDE_M / 2, SIDE_M / 2, 0.0], (N, 1))
     robot[N // 2 :, 2] = 180
     spots = [
@@ -301,7 +299,7 @@ def test_false_positives_at_a_spot_occur_only_while_it_is_in_view() -> None:
         assert abs(offset[:, axis].std() / 0.1 - 1) < 5 / np.sqrt(2 * len(rows))
 
 
-def test_false_positives_have_the_configured_identities() -> None:
+def test_false_positives_have_the_configured_identities():
     users = np.concatenate([NOBODY_THERE] * 3)
     perception = {"false_positives": {"per_hour": 900, "looks_like": {"cleo": 0.5, "ana": 0.2}}}
     rows = Watch(users, camera={"range": [1, 3]}, perception=perception).look()
@@ -312,7 +310,7 @@ def test_false_positives_have_the_configured_identities() -> None:
 # --- Who it is taken for --------------------------------------------------------------------------
 
 
-def test_users_are_recognized_mistaken_or_unknown_by_distance() -> None:
+def test_users_are_recognized_mistaken_or_unknown_by_distance():
     identity = {"right": [[0, 0.9], [8, 0.3]], "mistaken": [[0, 0.05], [8, 0.4]]}
     users = np.concatenate([around(DISTANCE, BEARING)] * 2)
     rows = Watch(users, perception={"identity": identity}).look()
@@ -324,7 +322,7 @@ def test_users_are_recognized_mistaken_or_unknown_by_distance() -> None:
         check_by(distance, edges, rows[:, Column.IDENTITY] == who, share)
 
 
-def test_users_are_mistaken_like_the_confusion_matrix() -> None:
+def test_users_are_mistaken_like_the_confusion_matrix():
     """No row is like a column: a transposed matrix would fail."""
     shares = {
         "ana": {"ben": 0.7, "cleo": 0.3},
@@ -344,12 +342,12 @@ def test_users_are_mistaken_like_the_confusion_matrix() -> None:
             assert agree(identities == v, share), (true, perceived)
 
 
-def test_the_only_user_is_mistaken_for_nobody_known() -> None:
+def test_the_only_user_is_mistaken_for_nobody_known():
     rows = Watch(around(DISTANCE, BEARING), perception={"identity": {"mistaken": 0.3}}).look()
     assert agree(rows[:, Column.IDENTITY] == -1, 0.3)
 
 
-def test_an_identity_lasts_as_long_as_its_track() -> None:
+def test_an_identity_lasts_as_long_as_its_track():
     """In view for 20 steps, then out of view for 10: the track is over after 5."""
     distance = np.where(np.arange(N) % 30 < 20, 3.0, 9.9)
     users = np.concatenate([around(distance, 0 * distance)] * 2)
@@ -390,7 +388,7 @@ def check_noise(values: F64, std: F64 | float) -> None:
     assert agree(np.abs(z) < 2, 0.9545, z=6)
 
 
-def test_range_noise_grows_with_distance() -> None:
+def test_range_noise_grows_with_distance():
     attributes = {"range_noise": "5 cm", "range_noise_share": "2 %"}
     rows = Watch(around(DISTANCE, BEARING), perception={"attributes": attributes}).look()
     distance, error, turn = polar(rows)
@@ -400,7 +398,7 @@ def test_range_noise_grows_with_distance() -> None:
     assert np.abs(turn).max() < 0.15  # a lattice unit at half a metre
 
 
-def test_bearing_noise_turns_and_does_not_stretch() -> None:
+def test_bearing_noise_turns_and_does_not_stretch():
     rows = Watch(
         around(DISTANCE, BEARING), perception={"attributes": {"bearing_noise_deg": 3}}
     ).look()
@@ -409,14 +407,14 @@ def test_bearing_noise_turns_and_does_not_stretch() -> None:
     assert np.abs(error).max() < 2 / UNITS_PER_M
 
 
-def test_range_and_bearing_noise_are_independent() -> None:
+def test_range_and_bearing_noise_are_independent():
     attributes = {"range_noise": 0.1, "bearing_noise_deg": 2}
     rows = Watch(around(DISTANCE, BEARING), perception={"attributes": attributes}).look()
     _, error, turn = polar(rows)
     assert abs(np.corrcoef(error, turn)[0, 1]) < 4.5 / np.sqrt(N)
 
 
-def test_heading_noise_is_that_configured() -> None:
+def test_heading_noise_is_that_configured():
     watch = Watch(
         around(DISTANCE, BEARING, FACING), perception={"attributes": {"heading_noise_deg": 10}}
     )
@@ -425,7 +423,7 @@ def test_heading_noise_is_that_configured() -> None:
     check_noise(turn, 10.0)
 
 
-def test_postures_are_confused_as_configured() -> None:
+def test_postures_are_confused_as_configured():
     posture = RNG.integers(0, 3, (1, N)).astype(np.int8)
     confusion = {"stand": {"sit": 0.1}, "sit": {"stand": 0.2, "lie": 0.05}}
     watch = Watch(
@@ -457,7 +455,7 @@ EVERYTHING = {
 }
 
 
-def test_a_perception_that_never_errs_perceives_the_truth() -> None:
+def test_a_perception_that_never_errs_perceives_the_truth():
     perception = {"identity": {"per_track": True}}
     users = np.concatenate([around(DISTANCE, BEARING, FACING)] * 2)
     rows = Watch(users, perception=perception).look()
@@ -466,7 +464,7 @@ def test_a_perception_that_never_errs_perceives_the_truth() -> None:
     assert (rows[:, Column.X : Column.POSTURE + 1] == rows[:, Column.TRUE_X :]).all()
 
 
-def test_spans_do_not_change_perception() -> None:
+def test_spans_do_not_change_perception():
     users = np.concatenate([around(DISTANCE, BEARING, FACING)] * 2)[:, :2000]
     whole = Watch(users, perception=EVERYTHING, camera={"latency": "3 s"})
     expected = whole.look()
@@ -479,7 +477,7 @@ def test_spans_do_not_change_perception() -> None:
     assert expected.tolist() == np.concatenate(parts).tolist()
 
 
-def test_a_user_more_changes_nothing_of_the_others() -> None:
+def test_a_user_more_changes_nothing_of_the_others():
     perception = {**EVERYTHING, "identity": {"mistaken": 0.1, "confusion": {"ana": {"ben": 1}}}}
     three = np.concatenate([around(DISTANCE, BEARING, FACING)] * 3)[:, :3000]
     rows = Watch(three, perception=perception).look()

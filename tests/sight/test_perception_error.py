@@ -28,13 +28,13 @@ def errors_of(*arguments: Any) -> dict[str, Any]:
     return dict(perception.errors)
 
 
-def test_an_error_is_of_the_type_of_its_name_unless_it_says_so() -> None:
+def test_an_error_is_of_the_type_of_its_name_unless_it_says_so():
     given = {"outliers": {"share": "5 %"}, "far": {"type": "outliers"}, "bare": "outliers"}
     errors = errors_of(content(given))
     assert {"outliers": Outliers(share=0.05), "far": Outliers(), "bare": Outliers()} == errors
 
 
-def test_an_override_changes_a_key_adds_an_error_and_changes_a_type() -> None:
+def test_an_override_changes_a_key_adds_an_error_and_changes_a_type():
     given = content({"outliers": {"share": 0.05, "spread": 2.0}})
     path = "robots.astro.perception.errors"
     assert {"outliers": Outliers(share=0.5, spread=2.0)} == errors_of(
@@ -47,7 +47,7 @@ def test_an_override_changes_a_key_adds_an_error_and_changes_a_type() -> None:
     assert "miscalibration" == changed["outliers"].type_name
 
 
-def test_a_scenario_is_read_back_as_it_was() -> None:
+def test_a_scenario_is_read_back_as_it_was():
     missed = {"type": f"{ERRORS}:Missed", "person": "ana"}
     loaded = fleet2d.load_scenario(content({"outliers": {"lasts": "5 s"}, "missed": missed}))
     again = fleet2d.load_scenario(loaded.resolved())
@@ -66,12 +66,12 @@ def test_a_scenario_is_read_back_as_it_was() -> None:
         ({"a": 3}, "expected a mapping with 'type', or the name of a type, got 3"),
     ],
 )
-def test_what_is_wrong_is_named(errors: Any, message: str) -> None:
+def test_what_is_wrong_is_named(errors, message):
     with pytest.raises(fleet2d.InputError, match=message.replace("(", r"\(")):
         fleet2d.load_scenario(content(errors))
 
 
-def test_a_plugin_is_found_by_the_name_of_its_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plugin_is_found_by_the_name_of_its_entry_point(monkeypatch):
     entry = EntryPoint("missing", "tests.own_errors:Missed", "fleet2d.perception_error")
     kinds = {"perception_error": [entry]}
     monkeypatch.setattr(components, "_plugins", lambda kind: EntryPoints(kinds.get(kind, [])))
@@ -80,7 +80,7 @@ def test_a_plugin_is_found_by_the_name_of_its_entry_point(monkeypatch: pytest.Mo
     assert "missing" in components.components("perception_error")
 
 
-def test_the_schema_knows_errors_with_and_without_a_type() -> None:
+def test_the_schema_knows_errors_with_and_without_a_type():
     whole = schema()
     validator = jsonschema.validators.validator_for(whole)(whole)
     good = {"outliers": {"share": 0.1}, "a": {"type": "miscalibration", "yaw_deg": 2}}

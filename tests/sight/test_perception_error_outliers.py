@@ -17,11 +17,11 @@ def errors(outliers: Outliers) -> np.ndarray:
     return off.x - 50
 
 
-def test_it_is_found_by_its_name() -> None:
+def test_it_is_found_by_its_name():
     assert lookup("perception_error", "outliers") is Outliers
 
 
-def test_a_share_is_off_by_bell_shaped_errors() -> None:
+def test_a_share_is_off_by_bell_shaped_errors():
     off = errors(Outliers(share="5 %", spread="80 cm"))
     is_off = off != 0
     assert abs(is_off.mean() - 0.05) < 4.5 * np.sqrt(0.05 * 0.95 / MANY)
@@ -29,7 +29,7 @@ def test_a_share_is_off_by_bell_shaped_errors() -> None:
     assert abs(off[is_off].std() - 0.8) < 4.5 * 0.8 / np.sqrt(2 * is_off.sum())
 
 
-def test_outliers_last() -> None:
+def test_outliers_last():
     is_off = errors(Outliers(share="20 %", lasts="10 s")) != 0
     groups = is_off.reshape(-1, 10).mean(axis=1)
     assert {True} == set((groups < 0.05) | (groups > 0.85))  # an error may be as small as nothing

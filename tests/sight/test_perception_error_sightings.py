@@ -16,7 +16,7 @@ from fleet2d.sight.perception_error import PerceptionError
 AT = np.linspace(0, 5, 7)
 
 
-def test_only_what_is_replaced_changes() -> None:
+def test_only_what_is_replaced_changes():
     seen = sightings(AT, AT)
     other = seen.replace(heading=1, noticed=np.arange(7) % 2 == 0)
     assert [1.0] * 7 == other.heading.tolist()
@@ -26,21 +26,21 @@ def test_only_what_is_replaced_changes() -> None:
     assert len(seen) == len(other) == 7
 
 
-def test_arrays_are_read_only() -> None:
+def test_arrays_are_read_only():
     seen = sightings(AT, AT).replace(heading=AT)
     for array in (seen.x, seen.heading, seen.true_user, seen.camera_x):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1
 
 
-def test_what_is_given_stays_writable_and_is_not_shared() -> None:
+def test_what_is_given_stays_writable_and_is_not_shared():
     mine = np.zeros(7)
     seen = sightings(AT, AT).replace(heading=mine)
     mine[0] = 5
     assert 0 == seen.heading[0]
 
 
-def test_moving_turns_stretches_and_shifts() -> None:
+def test_moving_turns_stretches_and_shifts():
     seen = sightings([2.0, 1.0], [0.0, 1.0], camera=(1.0, 0.0))
     moved = seen.moved(turn_deg=[90, -90], scale=2, offset=[0, 1])
     np.testing.assert_allclose([1.0, 4.0], moved.x, atol=1e-9)
@@ -48,7 +48,7 @@ def test_moving_turns_stretches_and_shifts() -> None:
     np.testing.assert_allclose([2.0, 3.0], moved.distance)
 
 
-def test_who_is_at_the_camera_stays_there() -> None:
+def test_who_is_at_the_camera_stays_there():
     moved = sightings([1.0], [1.0], camera=(1.0, 1.0)).moved(turn_deg=30, offset=1)
     assert (1.0, 1.0) == (moved.x[0], moved.y[0])
 
@@ -76,12 +76,12 @@ def test_who_is_at_the_camera_stays_there() -> None:
         ({"noticed": 1}, "noticed holds int64: expected true and false"),
     ],
 )
-def test_wrong_values_are_refused(change: dict[str, object], message: str) -> None:
+def test_wrong_values_are_refused(change, message):
     with pytest.raises(fleet2d.ComponentError, match=message):
         sightings(AT, AT).replace(**change)  # type: ignore[arg-type]
 
 
-def test_draws_are_addressed_by_purpose_person_step_and_error() -> None:
+def test_draws_are_addressed_by_purpose_person_step_and_error():
     people = np.array([0, 1, 0, 1, 0, 1, 0])
     seen, twin = (sightings(AT, AT, true_user=people) for _ in range(2))
     first = seen.uniform("a")
@@ -100,7 +100,7 @@ def test_draws_are_addressed_by_purpose_person_step_and_error() -> None:
     assert ((first >= 0) & (first < 1)).all()
 
 
-def test_draws_may_last_and_may_be_shared() -> None:
+def test_draws_may_last_and_may_be_shared():
     seen = sightings(AT, AT, true_user=[0, 1, 0, 1, 0, 1, 0], step=[0, 0, 1, 1, 2, 2, 3])
     lasting = seen.uniform("a", at=seen.step // 2)
     assert lasting[0] == lasting[2] != lasting[4] == lasting[6]
@@ -111,14 +111,14 @@ def test_draws_may_last_and_may_be_shared() -> None:
     np.testing.assert_array_equal(lasting, seen.uniform("a", at=seen.step * 0.5))
 
 
-def test_false_positives_of_one_look_have_draws_of_their_own() -> None:
+def test_false_positives_of_one_look_have_draws_of_their_own():
     seen = sightings(AT, AT, true_user=[-1, -1, -1, 0, -1, -1, 0], step=[0, 0, 0, 0, 1, 1, 1])
     assert 7 == len(set(seen.uniform("a").tolist()))
     part = sightings(AT[4:], AT[4:], true_user=[-1, -1, 0], step=[1, 1, 1])
     np.testing.assert_array_equal(seen.uniform("a")[4:], part.uniform("a"))
 
 
-def test_bell_shaped_draws_are_those_of_the_core() -> None:
+def test_bell_shaped_draws_are_those_of_the_core():
     seen = sightings(np.zeros(5000), np.zeros(5000))
     draws = seen.bell("a")
     key = stream_key(1, "robots.r", "camera: errors.e: a: ana")
@@ -128,18 +128,18 @@ def test_bell_shaped_draws_are_those_of_the_core() -> None:
     assert abs(draws.std() - 1) < 4.5 / np.sqrt(10_000)
 
 
-def test_a_class_without_distort_is_refused() -> None:
+def test_a_class_without_distort_is_refused():
     with pytest.raises(TypeError, match="distort"):
         PerceptionError()  # type: ignore[abstract]
 
 
-def test_hour_is_the_time_of_day_also_after_midnight() -> None:
+def test_hour_is_the_time_of_day_also_after_midnight():
     late = sightings([1.0, 1.0, 1.0], [0.0, 0.0, 0.0], step=[0, 1800, 2 * 3600])
 
     assert [23.0, 23.5, 1.0] == late.hour.tolist()
 
 
-def test_hour_is_what_the_clock_reads_also_where_it_is_changed() -> None:
+def test_hour_is_what_the_clock_reads_also_where_it_is_changed():
     zone = zone_of("Europe/Berlin", datetime(2026, 10, 24), datetime(2026, 10, 26))
     late = sightings([1.0, 1.0, 1.0], [0.0, 0.0, 0.0], step=[0, 3 * 3600, 4 * 3600])
 

@@ -22,11 +22,11 @@ def taken(user: int, **fields: Any) -> np.ndarray:
     return TakenFor.model_validate(fields).distort(seen).user
 
 
-def test_it_is_found_by_its_name() -> None:
+def test_it_is_found_by_its_name():
     assert lookup("perception_error", "taken_for") is TakenFor
 
 
-def test_each_user_is_taken_for_others_at_its_own_rate() -> None:
+def test_each_user_is_taken_for_others_at_its_own_rate():
     users = {"ben": "5 %", "cleo": {"rate": 0.2, "others": {"ana": 0.75, "unknown": 0.25}}}
     ben, cleo = (taken(user, users=users, lasts="0 s") for user in (1, 2))
     assert {1, 0} == set(ben.tolist())  # for ana, who has no entry
@@ -36,7 +36,7 @@ def test_each_user_is_taken_for_others_at_its_own_rate() -> None:
     assert (taken(0, users=users) == 0).all()
 
 
-def test_the_rate_of_a_pet_rises_with_its_height() -> None:
+def test_the_rate_of_a_pet_rises_with_its_height():
     rates = [
         (taken(1, users={"ben": pet}, lasts="0 s") != 1).mean()
         for pet in ({"kind": "cat"}, {"kind": "dog"}, {"kind": "big_dog"}, {"height": "1.1 m"})
@@ -45,7 +45,7 @@ def test_the_rate_of_a_pet_rises_with_its_height() -> None:
     assert rates == pytest.approx([0.013, 0.03, 0.088, 0.3], abs=0.015)
 
 
-def test_it_lasts() -> None:
+def test_it_lasts():
     groups = (taken(1, users={"ben": 0.2}, lasts="10 s") != 1).reshape(-1, 10).mean(axis=1)
     assert {0.0, 1.0} == set(groups.tolist())
 
@@ -61,7 +61,7 @@ def test_it_lasts() -> None:
         ({"unknown": 0.1}, "false_positives"),
     ],
 )
-def test_what_says_nothing_is_refused(users: dict[str, Any], words: str) -> None:
+def test_what_says_nothing_is_refused(users, words):
     with pytest.raises(ValidationError, match=words):
         TakenFor.model_validate({"users": users})
 
@@ -81,13 +81,13 @@ def home(users: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def test_a_cat_is_seen_as_ana_in_a_run() -> None:
+def test_a_cat_is_seen_as_ana_in_a_run():
     rows = fleet2d.run(home({"cat": {"rate": 0.5}})).pandas("observations")
     cat = rows[rows["true_user"] == "cat"]
     assert {"ana", "cat"} == set(cat["user"])
     assert (rows[rows["true_user"] == "ana"]["user"] == "ana").all()
 
 
-def test_a_user_that_is_not_there_is_an_error_with_its_name() -> None:
+def test_a_user_that_is_not_there_is_an_error_with_its_name():
     with pytest.raises(Fleet2DError, match="no user 'dog'"):
         fleet2d.run(home({"dog": {"kind": "dog"}}))

@@ -1,8 +1,5 @@
 """Sight in real homes, turned and mirrored, doors open and shut: the short form of the benchmark."""
 
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 from tests.scripts import script
@@ -20,7 +17,7 @@ PLANS = {
 
 
 @pytest.fixture(scope="module")
-def proof() -> ModuleType:
+def proof():
     """The script that compares millions of pairs."""
     return script("benchmarks/sight_proof.py")
 
@@ -28,8 +25,8 @@ def proof() -> ModuleType:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "doors"), some([*PLANS.items()], 2))
 def test_sight_agrees_with_every_wall_however_a_home_lies_and_its_doors_stand(
-    proof: ModuleType, shared_data: Path, name: str, doors: int
-) -> None:
+    proof, shared_data, name, doors
+):
     plan = fleet2d.load_floorplan(shared_data / name)
     wrong, (pairs, seen, arrangements) = proof.check_plan(plan, np.random.default_rng(7), 6)
 

@@ -52,9 +52,7 @@ def area_px2(home: Home, x: int, y: int) -> float:
         ),
     ],
 )
-def test_verdicts_are_the_true_ones(
-    shared_data: Path, verdict: str, margin: str, eye_of: Any
-) -> None:
+def test_verdicts_are_the_true_ones(shared_data, verdict, margin, eye_of):
     compared = 0
     for truth, home in truths(shared_data):
         for row in truth["tuples"]:
@@ -68,7 +66,7 @@ def test_verdicts_are_the_true_ones(
     assert compared > 750
 
 
-def test_areas_are_the_true_ones_and_not_smaller(shared_data: Path) -> None:
+def test_areas_are_the_true_ones_and_not_smaller(shared_data):
     # They shy away from corners by 1e-7 or so of a turn; ours were never the smaller.
     for truth, home in truths(shared_data):
         for row in truth["visibility_polygons"]:

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Timer
@@ -27,7 +27,7 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/19
 
 
 @pytest.fixture(autouse=True)
-def end_children() -> Iterator[None]:
+def end_children():
     yield
     apart._stop()
 
@@ -74,7 +74,7 @@ def soon(condition: Callable[[], bool]) -> bool:
 # --- One child ----------------------------------------------------------------------------------
 
 
-def test_files_in_a_row_have_one_child(tmp_path: Path) -> None:
+def test_files_in_a_row_have_one_child(tmp_path):
     plan = load_floorplan(good(tmp_path))
     first = child()
 
@@ -82,7 +82,7 @@ def test_files_in_a_row_have_one_child(tmp_path: Path) -> None:
     assert first == child()
 
 
-def test_errors_of_the_reader_arrive_and_leave_the_child(tmp_path: Path) -> None:
+def test_errors_of_the_reader_arrive_and_leave_the_child(tmp_path):
     path = good(tmp_path)
     plan = load_floorplan(path)
     first = child()
@@ -95,9 +95,7 @@ def test_errors_of_the_reader_arrive_and_leave_the_child(tmp_path: Path) -> None
     assert first == child()
 
 
-def test_bounds_in_the_environment_hold_at_the_next_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bounds_in_the_environment_hold_at_the_next_file(tmp_path, monkeypatch):
     path = good(tmp_path)
     load_floorplan(path)
     monkeypatch.setenv("FLEET2D_MAX_POLYGONS", "1")
@@ -108,7 +106,7 @@ def test_bounds_in_the_environment_hold_at_the_next_file(
     load_floorplan(path)
 
 
-def test_threads_share_a_child(tmp_path: Path) -> None:
+def test_threads_share_a_child(tmp_path):
     path = good(tmp_path)
     with ThreadPoolExecutor(4) as threads:
         plans = list(threads.map(load_floorplan, [path] * 8))
@@ -123,7 +121,7 @@ def _read_in_a_fork(path: Path, pids: "multiprocessing.Queue[int]") -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
-def test_daemonic_forks_start_children_of_their_own(tmp_path: Path) -> None:
+def test_daemonic_forks_start_children_of_their_own(tmp_path):
     path = good(tmp_path)
     load_floorplan(path)
     context = multiprocessing.get_context("fork")
@@ -141,7 +139,7 @@ def test_daemonic_forks_start_children_of_their_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_child_ends_with_its_parent(tmp_path: Path) -> None:
+def test_child_ends_with_its_parent(tmp_path):
     program = (
         "import sys, fleet2d; from fleet2d.storage import apart;"
         "fleet2d.load_floorplan(sys.argv[1]); print(apart._child.pid, flush=True);"
@@ -163,9 +161,7 @@ def test_child_ends_with_its_parent(tmp_path: Path) -> None:
         (signal.SIGSEGV, r"died \(SIGSEGV\)"),
     ],
 )
-def test_child_that_dies_is_an_error_and_the_next_file_has_another(
-    tmp_path: Path, ending: signal.Signals, message: str
-) -> None:
+def test_child_that_dies_is_an_error_and_the_next_file_has_another(tmp_path, ending, message):
     path = good(tmp_path)
     drawing = endless(tmp_path)
     load_floorplan(path)
@@ -178,7 +174,7 @@ def test_child_that_dies_is_an_error_and_the_next_file_has_another(
     load_floorplan(path)
 
 
-def test_dead_child_is_replaced_without_a_word(tmp_path: Path) -> None:
+def test_dead_child_is_replaced_without_a_word(tmp_path):
     path = good(tmp_path)
     load_floorplan(path)
     first = child()
@@ -190,7 +186,7 @@ def test_dead_child_is_replaced_without_a_word(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_time_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_time_is_limited(tmp_path, monkeypatch):
     monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
 
     with pytest.raises(FloorPlanError, match=r"longer to read than 1 seconds.*READ_SECONDS=2"):
@@ -198,9 +194,7 @@ def test_time_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.slow
-def test_processor_time_ends_before_the_clock_does(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_processor_time_ends_before_the_clock_does(tmp_path, monkeypatch):
     ends: list[int] = []
     death = apart._death
     monkeypatch.setattr(
@@ -216,9 +210,7 @@ def test_processor_time_ends_before_the_clock_does(
     assert [-signal.SIGXCPU] == ends
 
 
-def test_clock_limits_what_takes_no_processor_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_clock_limits_what_takes_no_processor_time(tmp_path, monkeypatch):
     monkeypatch.setattr(apart, "PATIENCE", 0.5)
     monkeypatch.setattr(apart, "_CODE", "import time; time.sleep(20)")
     monkeypatch.setenv("FLEET2D_MAX_READ_SECONDS", "1")
@@ -230,7 +222,7 @@ def test_clock_limits_what_takes_no_processor_time(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
-def test_memory_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_is_limited(tmp_path, monkeypatch):
     monkeypatch.setenv("FLEET2D_MAX_READ_MB", "40")
     path = tmp_path / "home.pgm"
     path.write_bytes(b"P5\n4000 4000\n255\n" + bytes(4000 * 4000))
@@ -240,7 +232,7 @@ def test_memory_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     load_floorplan(good(tmp_path))
 
 
-def test_ctrl_c_leaves_no_answer_for_the_next_file(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_no_answer_for_the_next_file(tmp_path):
     path = good(tmp_path)
     drawing = endless(tmp_path)
     plan = load_floorplan(path)
@@ -278,7 +270,7 @@ def answering(content: bytes, length: int | None = None) -> str:
     )
 
 
-def test_plan_arrives_as_it_was_built(tmp_path: Path) -> None:
+def test_plan_arrives_as_it_was_built(tmp_path):
     path = good(tmp_path)
     source = GeoJson(path=path)
     built = source.read(source.contents())
@@ -295,7 +287,7 @@ def test_plan_arrives_as_it_was_built(tmp_path: Path) -> None:
         np.testing.assert_array_equal(*arrays, strict=True)
 
 
-def test_coordinate_beyond_all_floats_is_refused() -> None:
+def test_coordinate_beyond_all_floats_is_refused():
     """JSON may spell infinity as a number, too, which no check of words refuses."""
     answer = changed(polygons=[{"#rings": [[[0, 0], [9, 0], [9, 9], [0, 9]]]}])
     apart._decode(answer, FloorPlan)
@@ -303,7 +295,7 @@ def test_coordinate_beyond_all_floats_is_refused() -> None:
         apart._decode(answer.replace(b"[9, 0]", b"[1e999, 0]"), FloorPlan)
 
 
-def test_right_answer_is_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_right_answer_is_a_plan(tmp_path, monkeypatch):
     monkeypatch.setattr(apart, "_CODE", answering(changed()))
 
     assert 4 == load_floorplan(good(tmp_path)).area_m2
@@ -341,12 +333,12 @@ TRIANGLE = [[0, 0], [9, 0], [9, 9]]
     ],
     ids=lambda answer: answer[:40].decode("latin-1"),
 )
-def test_wrong_answer_is_refused(answer: bytes) -> None:
+def test_wrong_answer_is_refused(answer):
     with pytest.raises(apart.WRONG):
         apart._decode(answer, FloorPlan)
 
 
-def test_answer_of_too_many_values_is_not_parsed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_answer_of_too_many_values_is_not_parsed(monkeypatch):
     apart._decode(changed(), FloorPlan)
     monkeypatch.setenv("FLEET2D_MAX_JSON_VALUES", "9")
     with pytest.raises(ValueError, match="too many values"):
@@ -358,9 +350,7 @@ def test_answer_of_too_many_values_is_not_parsed(monkeypatch: pytest.MonkeyPatch
     [(b"garbage", None), (bytes(1 << 26), 2**63)],
     ids=["garbage", "endless"],
 )
-def test_wrong_answer_is_an_error_of_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer: bytes, length: int | None
-) -> None:
+def test_wrong_answer_is_an_error_of_one_line(tmp_path, monkeypatch, answer, length):
     monkeypatch.setenv("FLEET2D_MAX_READ_MB", "64")
     monkeypatch.setattr(apart, "_CODE", answering(answer, length))
     with pytest.raises(FloorPlanError, match="its reader gave no valid answer: export the file"):
@@ -368,9 +358,7 @@ def test_wrong_answer_is_an_error_of_one_line(
 
 
 @pytest.mark.parametrize("length", [0, 9])
-def test_short_answer_is_that_of_a_dead_child(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, length: int
-) -> None:
+def test_short_answer_is_that_of_a_dead_child(tmp_path, monkeypatch, length):
     monkeypatch.setattr(apart, "_CODE", answering(b"", length).replace("sys.stdin.read()", ""))
 
     with pytest.raises(FloorPlanError, match=r"its reader died \(exit code 0\)"):

@@ -32,18 +32,18 @@ LOCK_NAME = "run.lock"
         "\x1b[31mred", "a\udcff", None, 3, ["a"],
     ],
 )  # fmt: skip
-def test_a_name_that_leads_elsewhere_is_refused(tmp_path: Path, name: object) -> None:
+def test_a_name_that_leads_elsewhere_is_refused(tmp_path, name):
     with pytest.raises(RunDirectoryError, match="which is not inside of it") as caught:
         path_in(tmp_path, name)
     assert str(caught.value).isprintable()
 
 
 @pytest.mark.parametrize("name", ["run", "learned/ltp.npz", "tables/events/000001.parquet", "é b"])
-def test_a_plain_name_is_a_path(tmp_path: Path, name: str) -> None:
+def test_a_plain_name_is_a_path(tmp_path, name):
     assert tmp_path / name == path_in(tmp_path, name)
 
 
-def test_links_and_devices_are_refused_wherever_they_are_on_the_way(tmp_path: Path) -> None:
+def test_links_and_devices_are_refused_wherever_they_are_on_the_way(tmp_path):
     folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "file").write_text("theirs")
@@ -64,14 +64,14 @@ def test_links_and_devices_are_refused_wherever_they_are_on_the_way(tmp_path: Pa
     refuse_links(folder, ("nothing",))
 
 
-def test_the_folder_itself_may_be_a_link(tmp_path: Path) -> None:
+def test_the_folder_itself_may_be_a_link(tmp_path):
     (tmp_path / "first").mkdir()
     (tmp_path / "latest").symlink_to(tmp_path / "first")
     assert tmp_path / "latest" / "file" == path_in(tmp_path / "latest", "file")
     refuse_links(tmp_path / "latest")
 
 
-def test_a_link_in_place_of_a_file_is_replaced(tmp_path: Path) -> None:
+def test_a_link_in_place_of_a_file_is_replaced(tmp_path):
     """`study.json.partial` led to a file of the user, which was overwritten."""
     theirs = tmp_path / "theirs"
     theirs.write_text("precious")
@@ -84,9 +84,7 @@ def test_a_link_in_place_of_a_file_is_replaced(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
-def test_a_file_that_was_not_finished_leaves_the_old_one(
-    tmp_path: Path, error: type[BaseException]
-) -> None:
+def test_a_file_that_was_not_finished_leaves_the_old_one(tmp_path, error):
     file = tmp_path / "plan.json"
     file.write_text("old")
 
@@ -101,9 +99,7 @@ def test_a_file_that_was_not_finished_leaves_the_old_one(
     assert [file] == list(tmp_path.iterdir())
 
 
-def test_a_file_is_on_the_disk_before_it_replaces_another(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_is_on_the_disk_before_it_replaces_another(tmp_path, monkeypatch):
     """After a power cut, a name may else lead to a file without content."""
     done: list[str] = []
     for name in ("write_all", "sync", "replace"):
@@ -116,12 +112,12 @@ def test_a_file_is_on_the_disk_before_it_replaces_another(
 
 
 @pytest.mark.parametrize("path", [".", "/"])
-def test_a_path_without_a_name_is_no_file(path: str) -> None:
+def test_a_path_without_a_name_is_no_file(path):
     with pytest.raises(OSError, match="Is a directory"):
         write_atomically(Path(path), b"{}")
 
 
-def test_a_lock_that_is_left_over_is_no_hindrance(tmp_path: Path) -> None:
+def test_a_lock_that_is_left_over_is_no_hindrance(tmp_path):
     (tmp_path / LOCK_NAME).write_text("process 1 on another machine")
     lock = FolderLock(tmp_path, LOCK_NAME)
     lock.release()
@@ -129,7 +125,7 @@ def test_a_lock_that_is_left_over_is_no_hindrance(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
+def test_only_one_of_many_takes_the_lock(tmp_path):
     code = (
         "import sys, time; from pathlib import Path; from fleet2d.storage.files import FolderLock\n"
         f"try: FolderLock(Path({str(tmp_path)!r}), 'run.lock'); print('mine'); time.sleep(2)\n"
@@ -147,7 +143,7 @@ def test_only_one_of_many_takes_the_lock(tmp_path: Path) -> None:
     assert 4 == outputs.count("RunDirectoryError")
 
 
-def test_a_folder_that_could_not_be_made_leaves_nothing(tmp_path: Path) -> None:
+def test_a_folder_that_could_not_be_made_leaves_nothing(tmp_path):
     def make() -> None:
         with new_folder(tmp_path / "bag") as made:
             made.mkdir()
@@ -159,7 +155,7 @@ def test_a_folder_that_could_not_be_made_leaves_nothing(tmp_path: Path) -> None:
     assert [] == list(tmp_path.iterdir())
 
 
-def test_what_a_killed_process_left_of_a_folder_is_replaced(tmp_path: Path) -> None:
+def test_what_a_killed_process_left_of_a_folder_is_replaced(tmp_path):
     left = tmp_path / "bag.partial" / "bag"
     left.mkdir(parents=True)
     (left / "half").touch()
@@ -171,7 +167,7 @@ def test_what_a_killed_process_left_of_a_folder_is_replaced(tmp_path: Path) -> N
     )
 
 
-def test_a_link_in_place_of_what_was_left_is_removed_and_not_followed(tmp_path: Path) -> None:
+def test_a_link_in_place_of_what_was_left_is_removed_and_not_followed(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "file").touch()
     (tmp_path / "bag.partial").symlink_to(tmp_path / "mine")
@@ -182,7 +178,7 @@ def test_a_link_in_place_of_what_was_left_is_removed_and_not_followed(tmp_path: 
 
 
 @pytest.mark.parametrize("kind", ["folder", "file", "link"])
-def test_a_folder_that_is_there_is_not_replaced(tmp_path: Path, kind: str) -> None:
+def test_a_folder_that_is_there_is_not_replaced(tmp_path, kind):
     path = tmp_path / "bag"
     if kind == "link":
         path.symlink_to(tmp_path / "nowhere")
@@ -193,9 +189,7 @@ def test_a_folder_that_is_there_is_not_replaced(tmp_path: Path, kind: str) -> No
     assert ["bag"] == [entry.name for entry in tmp_path.iterdir()]
 
 
-def test_the_scratch_folder_of_a_killed_process_is_removed_by_the_next(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_scratch_folder_of_a_killed_process_is_removed_by_the_next(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     code = (
         "import os, signal, sys; from fleet2d.storage.files import scratch_folder\n"

@@ -24,7 +24,7 @@ def texts_of(path: Path, start: int = 0) -> list[str]:
     return [frame.description for frame in read_frames(path, NOTES, start)]
 
 
-def test_frames_are_read_up_to_where_they_were_cut_off(tmp_path: Path) -> None:
+def test_frames_are_read_up_to_where_they_were_cut_off(tmp_path):
     path = tmp_path / "journal"
     written(path, ["one", "two"]).close()
     whole = path.read_bytes()
@@ -36,7 +36,7 @@ def test_frames_are_read_up_to_where_they_were_cut_off(tmp_path: Path) -> None:
         assert ["one", "two"][: sum(frame.end <= size for frame in frames)] == texts_of(path)
 
 
-def test_a_journal_goes_on_behind_a_frame(tmp_path: Path) -> None:
+def test_a_journal_goes_on_behind_a_frame(tmp_path):
     path = tmp_path / "journal"
     written(path, ["one", "two"]).close()
     first = next(read_frames(path, NOTES))
@@ -48,7 +48,7 @@ def test_a_journal_goes_on_behind_a_frame(tmp_path: Path) -> None:
     assert ["one", "three"] == texts_of(path)
 
 
-def test_a_new_journal_replaces_a_link_and_what_was_there(tmp_path: Path) -> None:
+def test_a_new_journal_replaces_a_link_and_what_was_there(tmp_path):
     (tmp_path / "theirs").write_text("precious")
     (tmp_path / "journal").symlink_to(tmp_path / "theirs")
     written(tmp_path / "journal", ["one"]).close()
@@ -57,7 +57,7 @@ def test_a_new_journal_replaces_a_link_and_what_was_there(tmp_path: Path) -> Non
     assert "precious" == (tmp_path / "theirs").read_text()
 
 
-def test_a_failed_write_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_write_is_undone(tmp_path, monkeypatch):
     writer = written(tmp_path / "journal", ["one"])
     write_all = files.write_all
 
@@ -77,7 +77,7 @@ def test_a_failed_write_is_undone(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert ["one", "three"] == texts_of(tmp_path / "journal")
 
 
-def test_frames_end_at_a_kind_that_the_journal_does_not_have(tmp_path: Path) -> None:
+def test_frames_end_at_a_kind_that_the_journal_does_not_have(tmp_path):
     path = tmp_path / "journal"
     written(path, ["one"]).close()
     first = next(read_frames(path, NOTES))
@@ -89,7 +89,7 @@ def test_frames_end_at_a_kind_that_the_journal_does_not_have(tmp_path: Path) -> 
     assert ["one"] == texts_of(path)
 
 
-def test_other_files_have_no_frames(tmp_path: Path) -> None:
+def test_other_files_have_no_frames(tmp_path):
     assert [] == texts_of(tmp_path / "nothing")
     (tmp_path / "text").write_text("hello")
     assert [] == texts_of(tmp_path / "text")
@@ -97,7 +97,7 @@ def test_other_files_have_no_frames(tmp_path: Path) -> None:
         texts_of(tmp_path)
 
 
-def test_a_changed_byte_ends_the_journal_before_its_frame(tmp_path: Path) -> None:
+def test_a_changed_byte_ends_the_journal_before_its_frame(tmp_path):
     path = tmp_path / "journal"
     written(path, ["one", "two"]).close()
     whole = path.read_bytes()
@@ -107,7 +107,7 @@ def test_a_changed_byte_ends_the_journal_before_its_frame(tmp_path: Path) -> Non
         assert ["one", "two"][: sum(end <= at for end in ends)] == texts_of(path)
 
 
-def test_a_size_beyond_the_file_is_not_read(tmp_path: Path) -> None:
+def test_a_size_beyond_the_file_is_not_read(tmp_path):
     """A few bytes requested all memory."""
     path = tmp_path / "journal"
     written(path, ["one"]).close()

@@ -1,11 +1,9 @@
 """Names in letters of any script: which there are, and that a whole run is stored and read back by them."""
 
 import json
-from pathlib import Path
 
 import pytest
 import yaml
-from tests.scenes import Cli
 
 import fleet2d
 from fleet2d.artifacts.table import Column, TableSpec
@@ -18,7 +16,7 @@ NAMES = ("müller", "مريم", "Ольга", "花子", "हिंदी", "Ελ
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_name_of_any_script_is_one(name: str) -> None:
+def test_name_of_any_script_is_one(name):
     assert problem_of(name) is None
 
 
@@ -40,11 +38,11 @@ def test_name_of_any_script_is_one(name: str) -> None:
         ("ü" * (MOST_BYTES // 2 + 1), "100 bytes at most"),
     ],
 )
-def test_what_is_no_name_is_said(name: str, problem: str) -> None:
+def test_what_is_no_name_is_said(name, problem):
     assert problem in (problem_of(name) or "")
 
 
-def test_expectations_read_a_name_as_it_is() -> None:
+def test_expectations_read_a_name_as_it_is():
     for name in NAMES:
         if "-" not in name:
             assert name in repr(parse_expectation(f"always(distance(astro, {name}) > 0.5 m)"))
@@ -65,9 +63,7 @@ SCENARIO = {
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:the fonts of this machine")
-def test_run_of_names_in_any_script_is_stored_reproduced_and_exported(
-    fleet2d: Cli, tmp_path: Path
-) -> None:
+def test_run_of_names_in_any_script_is_stored_reproduced_and_exported(fleet2d, tmp_path):
     folder = tmp_path / "Größe 1" / "بيت"
     folder.mkdir(parents=True)
     file = folder / "مريم.yaml"
@@ -86,7 +82,7 @@ def test_run_of_names_in_any_script_is_stored_reproduced_and_exported(
     assert 0 == code, out
 
 
-def test_tables_of_such_a_run_have_its_names(tmp_path: Path) -> None:
+def test_tables_of_such_a_run_have_its_names(tmp_path):
     fleet2d.run(SCENARIO, out=tmp_path / "run")
     run = fleet2d.open_run(tmp_path / "run")
     assert {"müller", "مريم"} == set(run.metrics["sightings"])
@@ -96,6 +92,6 @@ def test_tables_of_such_a_run_have_its_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", ".a", "-a", "a/b", "a b", "a\u202eb"])
-def test_a_table_is_named_by_words_only(name: str) -> None:
+def test_a_table_is_named_by_words_only(name):
     with pytest.raises(ArtifactError):
         TableSpec(name, (Column("step", "step"),))

@@ -19,13 +19,13 @@ from fleet2d.storage.secret_files import (
 
 
 @pytest.fixture
-def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def key(tmp_path, monkeypatch):
     """The path of a key that isn't made yet."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     return state_folder() / KEY_NAME
 
 
-def test_the_secret_is_made_at_first_use_for_this_user_alone(key: Path) -> None:
+def test_the_secret_is_made_at_first_use_for_this_user_alone(key):
     secret = user_secret(KEY_NAME)
     assert secret == user_secret(KEY_NAME) == key.read_bytes()
     assert len(set(secret)) > 10
@@ -33,7 +33,7 @@ def test_the_secret_is_made_at_first_use_for_this_user_alone(key: Path) -> None:
     assert (0o600, 0o700) == tuple(stat.S_IMODE(p.stat().st_mode) for p in (key, key.parent))
 
 
-def test_processes_that_make_it_at_once_end_with_one(key: Path, tmp_path: Path) -> None:
+def test_processes_that_make_it_at_once_end_with_one(key, tmp_path):
     code = (
         "import sys, time; from fleet2d.storage.secret_files import user_secret\n"
         "print('ready', flush=True); sys.stdin.read(1); print(user_secret('signing-key').decode())"
@@ -53,9 +53,7 @@ def test_processes_that_make_it_at_once_end_with_one(key: Path, tmp_path: Path) 
     assert [key] == list(key.parent.iterdir())
 
 
-def test_a_secret_that_another_process_has_just_made_is_taken(
-    key: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_secret_that_another_process_has_just_made_is_taken(key, monkeypatch):
     """Between the look and the making."""
     first = user_secret(KEY_NAME)
     monkeypatch.setattr(os.path, "lexists", lambda _: False)
@@ -84,7 +82,7 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("fault", DAMAGES)
-def test_a_secret_that_others_may_know_is_refused(key: Path, fault: str) -> None:
+def test_a_secret_that_others_may_know_is_refused(key, fault):
     user_secret(KEY_NAME)
     DAMAGES[fault](key)
     with pytest.raises(UnusableSecretError) as caught:
@@ -92,7 +90,7 @@ def test_a_secret_that_others_may_know_is_refused(key: Path, fault: str) -> None
     assert f"{key} {fault}: delete it, and a new one is made" == str(caught.value)
 
 
-def test_a_secret_of_another_user_is_refused(key: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_secret_of_another_user_is_refused(key, monkeypatch):
     user_secret(KEY_NAME)
     me = os.geteuid()
     monkeypatch.setattr(os, "geteuid", lambda: me + 1)
@@ -101,9 +99,7 @@ def test_a_secret_of_another_user_is_refused(key: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("obstacle", ["file", "dangling link", "no home"])
-def test_where_nothing_can_be_kept_it_says_so(
-    key: Path, monkeypatch: pytest.MonkeyPatch, obstacle: str
-) -> None:
+def test_where_nothing_can_be_kept_it_says_so(key, monkeypatch, obstacle):
     if obstacle == "file":
         key.parents[1].write_text("")
     elif obstacle == "dangling link":
@@ -124,16 +120,14 @@ def test_where_nothing_can_be_kept_it_says_so(
         ("win32", "AppData/Local"),
     ],
 )
-def test_the_folder_is_the_usual_one_of_the_system(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, system: str, folder: str
-) -> None:
+def test_the_folder_is_the_usual_one_of_the_system(tmp_path, monkeypatch, system, folder):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.delenv("XDG_STATE_HOME")
     monkeypatch.setattr(sys, "platform", system)
     assert tmp_path / folder / "fleet2d" == state_folder()
 
 
-def test_a_signature_is_for_one_purpose_and_one_content(key: Path) -> None:
+def test_a_signature_is_for_one_purpose_and_one_content(key):
     one, other = signature("one"), signature("other")
     assert one.hexdigest() != other.hexdigest()
     assert one.hexdigest() == signature("one").hexdigest()

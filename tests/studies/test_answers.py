@@ -1,7 +1,6 @@
 """Answers on made-up variants, where the truth is known; and on a robot that hangs out or not."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,7 +51,7 @@ def compare(frame: pl.DataFrame, **keys: Any) -> list[dict[str, Any]]:
     return Answers(frame).paired("score", {"method": "old"}, **keys).to_dicts()
 
 
-def test_a_known_difference_is_found_though_homes_differ_more() -> None:
+def test_a_known_difference_is_found_though_homes_differ_more():
     (row,) = compare(variants())
     assert row["low"] < 0.5 < row["high"]
     assert row["high"] - row["low"] < 0.2
@@ -60,39 +59,39 @@ def test_a_known_difference_is_found_though_homes_differ_more() -> None:
     assert (64, 8, 4) == (row["pairs"], row["n_home"], row["n_seed"])
 
 
-def test_pairs_take_out_what_homes_and_lives_have_in_common() -> None:
+def test_pairs_take_out_what_homes_and_lives_have_in_common():
     (row,) = compare(variants())
     assert row["variance_ratio"] > 100
 
 
-def test_within_an_axis_each_of_its_values_has_a_row() -> None:
+def test_within_an_axis_each_of_its_values_has_a_row():
     rows = compare(variants(), within=("robot",))
     assert ["patrol", "hangout"] == [row["robot"] for row in rows]
 
 
-def test_missing_variants_leave_out_their_pairs_only() -> None:
+def test_missing_variants_leave_out_their_pairs_only():
     frame = variants().filter(~((pl.col("home") == 0) & (pl.col("method") == "new")))
     (row,) = compare(frame)
     assert (56, 7) == (row["pairs"], row["n_home"])
 
 
-def test_too_few_replicates_are_named_with_how_many_are_needed() -> None:
+def test_too_few_replicates_are_named_with_how_many_are_needed():
     (row,) = compare(variants(homes=3, effect=0.05, noise=0.4))
     assert "too few replicates to tell" in row["verdict"]
     assert "homes (now 3)" in row["verdict"]
 
 
-def test_one_pair_tells_nothing() -> None:
+def test_one_pair_tells_nothing():
     (row,) = compare(variants(homes=1, seeds=1), within=("robot",))[:1]
     assert "one pair only" in row["verdict"]
 
 
-def test_equal_values_are_called_the_same() -> None:
+def test_equal_values_are_called_the_same():
     (row,) = compare(variants(effect=0, noise=0))
     assert "the same as old in every pair" == row["verdict"]
 
 
-def test_an_axis_that_applies_on_one_side_only_needs_no_partner() -> None:
+def test_an_axis_that_applies_on_one_side_only_needs_no_partner():
     frame = variants().with_columns(
         explore=pl.when(pl.col("method") == "new").then(0.2).otherwise(None)
     )
@@ -101,24 +100,24 @@ def test_an_axis_that_applies_on_one_side_only_needs_no_partner() -> None:
 
 
 @pytest.mark.parametrize("keys", [{"by": ("home", "method")}, {"within": ("method",)}])
-def test_what_is_compared_is_no_unit_and_no_group(keys: dict[str, Any]) -> None:
+def test_what_is_compared_is_no_unit_and_no_group(keys):
     with pytest.raises(InputError, match="method is what is compared"):
         compare(variants(), **keys)
 
 
-def test_without_pairs_there_is_no_answer() -> None:
+def test_without_pairs_there_is_no_answer():
     frame = variants().filter((pl.col("method") == "new") == (pl.col("home") < 4))
     with pytest.raises(InputError, match="no two variants differ by method alone"):
         compare(frame)
 
 
-def test_shares_of_the_variance_name_what_matters() -> None:
+def test_shares_of_the_variance_name_what_matters():
     table = Answers(variants(effect=0)).shares("score")
     assert "home" == table["source"][0]
     assert 1 == pytest.approx(table["share"].sum(), abs=0.05)
 
 
-def test_the_ratio_of_variances_is_that_of_unpaired_to_paired() -> None:
+def test_the_ratio_of_variances_is_that_of_unpaired_to_paired():
     generator = np.random.default_rng(2)
     life = generator.normal(0, 1, 4000)
     method_a, method_b = (life + generator.normal(0, 0.5, 4000) for _ in range(2))
@@ -128,7 +127,7 @@ def test_the_ratio_of_variances_is_that_of_unpaired_to_paired() -> None:
 
 
 @pytest.mark.slow
-def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path: Path) -> None:
+def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path):
     """The same lives in the same homes; compared with runs whose home and seed are another's."""
     patrol = {"type": "patrol", "cooldown": "1 h"}
     hangout = {"type": "hangout", "source": "ltp", "near": "view", "period": "30 min"}
@@ -167,7 +166,7 @@ def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path:
         assert unpaired.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)
 
 
-def test_p_values_are_corrected_for_the_number_of_comparisons() -> None:
+def test_p_values_are_corrected_for_the_number_of_comparisons():
     frame = pl.concat(
         [variants(effect=0.04), variants(effect=0.03).with_columns(method=pl.lit("newer"))]
     ).unique(["method", "robot", "home", "seed"], maintain_order=True)
@@ -176,7 +175,7 @@ def test_p_values_are_corrected_for_the_number_of_comparisons() -> None:
     assert holm([first["p"], second["p"]]) == [first["p_holm"], second["p_holm"]]
 
 
-def test_an_effect_is_told_in_deviations_and_relative_to_the_reference() -> None:
+def test_an_effect_is_told_in_deviations_and_relative_to_the_reference():
     frame = pl.DataFrame(
         {"method": method, "robot": "patrol", "home": home, "seed": 0, "score": score}
         for method, scores in (("old", [2.0, 4.0, 6.0]), ("new", [3.0, 6.0, 9.0]))
@@ -187,7 +186,7 @@ def test_an_effect_is_told_in_deviations_and_relative_to_the_reference() -> None
     assert row["effect_size"] == pytest.approx(2.0)  # differences 1, 2, 3
 
 
-def test_differences_of_each_home_have_the_mean_of_all() -> None:
+def test_differences_of_each_home_have_the_mean_of_all():
     frame = variants()
     rows = Answers(frame).differences("score", {"method": "old"}, "home")
     assert ["method", "home", "difference"] == rows.columns
@@ -196,7 +195,7 @@ def test_differences_of_each_home_have_the_mean_of_all() -> None:
     assert row["difference"] == pytest.approx(rows["difference"].mean())
 
 
-def test_differences_of_each_home_within_another_axis_are_of_its_values() -> None:
+def test_differences_of_each_home_within_another_axis_are_of_its_values():
     frame = variants()
     rows = Answers(frame).differences("score", {"method": "old"}, "home", ["robot"])
     assert ["method", "robot", "home", "difference"] == rows.columns
@@ -206,14 +205,14 @@ def test_differences_of_each_home_within_another_axis_are_of_its_values() -> Non
         assert expected.equals(rows.filter(pl.col("robot") == robot).drop("robot"))
 
 
-def test_what_no_axis_explains_is_the_residual() -> None:
+def test_what_no_axis_explains_is_the_residual():
     table = Answers(variants(noise=3.0)).shares("score")
     assert "residual" == table["source"][-1]
     assert table["share"][-1] > 0.1
     assert 1 == pytest.approx(table["share"].sum())
 
 
-def test_shares_of_nothing_are_zero_and_no_rounding_errors() -> None:
+def test_shares_of_nothing_are_zero_and_no_rounding_errors():
     table = Answers(variants(effect=0, noise=0)).shares("score")
     shares = dict(table.iter_rows())
     assert 0 == shares["robot"] == shares["residual"] == shares["method × robot"]
@@ -223,7 +222,7 @@ def power(frame: pl.DataFrame, effect: float | None) -> pl.DataFrame:
     return Answers(frame).power("score", {"method": "old"}, effect)
 
 
-def test_more_homes_and_seeds_detect_smaller_differences() -> None:
+def test_more_homes_and_seeds_detect_smaller_differences():
     table = power(variants(), None)
     assert ["method", "seed", "home", "detectable"] == table.columns
     assert table.sort("home", "seed")["detectable"][0] == table["detectable"].max()
@@ -231,13 +230,13 @@ def test_more_homes_and_seeds_detect_smaller_differences() -> None:
     assert sorted(by_home, reverse=True) == by_home
 
 
-def test_an_effect_needs_the_more_homes_the_smaller_it_is() -> None:
+def test_an_effect_needs_the_more_homes_the_smaller_it_is():
     few, many = (power(variants(noise=1.0), effect)["home"] for effect in (0.5, 0.1))
     assert all(a is not None and (b is None or a <= b) for a, b in zip(few, many, strict=True))
     assert few[0] < 1000
 
 
-def test_the_power_of_one_pair_is_unknown() -> None:
+def test_the_power_of_one_pair_is_unknown():
     with pytest.raises(InputError, match="run a small study"):
         power(variants(homes=1, seeds=1).filter(pl.col("robot") == "patrol"), 0.5)
 
@@ -262,7 +261,7 @@ def by_method(*values: list[float]) -> pl.DataFrame:
     )
 
 
-def test_intervals_of_shares_and_of_their_differences_stay_within_what_is_possible() -> None:
+def test_intervals_of_shares_and_of_their_differences_stay_within_what_is_possible():
     answers = Shares(by_method([0.0, 0.0, 0.9, 0.0], [1.0, 0.9, 1.0, 0.0]))
     table = answers.paired("score", {"method": "old"}, ["home"])
     assert 1 == table["high"][0]
@@ -271,7 +270,7 @@ def test_intervals_of_shares_and_of_their_differences_stay_within_what_is_possib
     assert means["high"].max() == 1  # type: ignore[comparison-overlap]
 
 
-def test_a_verdict_follows_the_corrected_p() -> None:
+def test_a_verdict_follows_the_corrected_p():
     generator = np.random.default_rng(4)
     old = generator.normal(0, 1, 30)
     noise = generator.normal(0, 1, 30)
@@ -285,7 +284,7 @@ def test_a_verdict_follows_the_corrected_p() -> None:
         assert row["clear"] != ("too few replicates to tell" in row["verdict"])
 
 
-def test_tables_that_are_read_together_are_corrected_together() -> None:
+def test_tables_that_are_read_together_are_corrected_together():
     generator = np.random.default_rng(4)
     old = generator.normal(0, 1, 30)
     new = old + 0.5 + generator.normal(0, 1, 30)
@@ -299,20 +298,20 @@ def test_tables_that_are_read_together_are_corrected_together() -> None:
     assert all(each.interval[0] < 0 < each.interval[1] for each in together)
 
 
-def test_a_clear_difference_of_few_homes_is_told_without_its_amount() -> None:
+def test_a_clear_difference_of_few_homes_is_told_without_its_amount():
     (row,) = compare(variants())
     assert row["clear"]
     assert "above old in 64 of 64 pairs; how much can't be told" in row["verdict"]
     assert "with 8 homes, 43 % of studies miss a kind" in row["doubt"]
 
 
-def test_enough_homes_have_an_interval_that_is_told() -> None:
+def test_enough_homes_have_an_interval_that_is_told():
     (row,) = compare(variants(homes=30))
     assert "" == row["doubt"]
     assert "above old in 240 of 240 pairs" == row["verdict"]
 
 
-def test_a_verdict_says_what_is_better() -> None:
+def test_a_verdict_says_what_is_better():
     generator = np.random.default_rng(4)
     old = generator.uniform(0.3, 0.5, 30)
     worse = (old - generator.uniform(0.1, 0.2, 30)).tolist()
@@ -321,7 +320,7 @@ def test_a_verdict_says_what_is_better() -> None:
     assert "below old in 30 of 30 pairs, which is worse" == row["verdict"]
 
 
-def test_a_mean_against_most_pairs_tells_nothing_from_few_homes() -> None:
+def test_a_mean_against_most_pairs_tells_nothing_from_few_homes():
     few = [-0.02, -0.01, -0.03, -0.02, 4.0, 4.2, 4.1]
     (row,) = compare(by_method([0.0] * 7, few))
     assert not row["clear"]
@@ -331,9 +330,7 @@ def test_a_mean_against_most_pairs_tells_nothing_from_few_homes() -> None:
     ("difference", "p", "words"),
     [(0.0, 1.0, "the same as old in every pair"), (0.5, 0.25, "too few replicates to tell")],
 )
-def test_equal_differences_of_three_homes_show_nothing(
-    difference: float, p: float, words: str
-) -> None:
+def test_equal_differences_of_three_homes_show_nothing(difference, p, words):
     (row,) = compare(by_method([1.0, 2.0, 4.0], [1.0 + difference, 2 + difference, 4 + difference]))
     assert (p, False) == (row["p"], row["clear"])
     assert words in row["verdict"]
@@ -341,14 +338,14 @@ def test_equal_differences_of_three_homes_show_nothing(
     assert "all 3 values are equal" in row["doubt"]
 
 
-def test_equal_differences_of_eight_homes_are_clear() -> None:
+def test_equal_differences_of_eight_homes_are_clear():
     (row,) = compare(by_method([1.0] * 8, [1.5] * 8))
     assert row["clear"]
     assert 2 / 2**8 == row["p"]
     assert "above old in 8 of 8 pairs" in row["verdict"]
 
 
-def test_one_home_and_one_seed_have_no_interval() -> None:
+def test_one_home_and_one_seed_have_no_interval():
     answers = Answers(by_method([1.0], [2.0]))
     (row,) = answers.paired("score", {"method": "old"}).to_dicts()
     assert (False, True) == (row["clear"], math.isnan(row["low"]))

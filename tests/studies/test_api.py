@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -40,26 +39,26 @@ def end_the_process(run: Run) -> None:
     os._exit(3)
 
 
-def test_a_study_is_run_and_opened(tmp_path: Path) -> None:
+def test_a_study_is_run_and_opened(tmp_path):
     study = fleet2d.study(small(replicates=1), tmp_path / "study", executor="serial")
     assert f"<Study {tmp_path / 'study'}: 2 of 2 variants complete>" == repr(study)
     assert [0.3, 0.6] == study.variants[SPEED].to_list()
 
 
 @pytest.mark.slow
-def test_a_study_of_ones_own_components_runs_in_workers(tmp_path: Path) -> None:
+def test_a_study_of_ones_own_components_runs_in_workers(tmp_path):
     own = {"share": {"type": f"{OWN}:Share", "period": "1 min"}}
     study = fleet2d.study(small(base=base(algorithms=own), replicates=1), tmp_path / "s", workers=1)
     assert 2 == study.counts.complete
 
 
 @pytest.mark.slow
-def test_a_map_returns_results_in_the_order_of_the_scenarios() -> None:
+def test_a_map_returns_results_in_the_order_of_the_scenarios():
     expected = [fleet2d.run(scenario).digest for scenario in SEEDED]
     assert expected == map_runs(digest_of, SEEDED, workers=2)
 
 
-def test_a_map_of_nothing_is_empty() -> None:
+def test_a_map_of_nothing_is_empty():
     assert [] == map_runs(digest_of, [])
 
 
@@ -78,33 +77,33 @@ class Reads:
         return Reads.count
 
 
-def test_a_worker_reads_the_function_once() -> None:
+def test_a_worker_reads_the_function_once():
     reads = map_runs(Reads(), SEEDED, executor="serial")
     assert 1 == len(set(reads))
 
 
 @pytest.mark.slow
-def test_a_lambda_can_be_mapped() -> None:
+def test_a_lambda_can_be_mapped():
     pytest.importorskip("cloudpickle")
     assert [0, 1, 2, 3] == map_runs(lambda run: run.manifest["seed"], SEEDED, workers=1)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("executor", ["local", "serial"])
-def test_what_a_function_raises_is_raised_with_its_scenario(executor: str) -> None:
+def test_what_a_function_raises_is_raised_with_its_scenario(executor):
     with pytest.raises(ValueError, match="two") as caught:
         map_runs(fail_on_seed_two, SEEDED, workers=1, executor=executor)  # type: ignore[arg-type]
     assert ["in scenario 2"] == caught.value.__notes__
 
 
 @pytest.mark.slow
-def test_a_function_that_ends_its_process_is_given_up() -> None:
+def test_a_function_that_ends_its_process_is_given_up():
     with pytest.raises(ComponentError, match=r"exit code 3.*in each of 3 attempts"):
         map_runs(end_the_process, SEEDED[:1], workers=1)
 
 
 @pytest.mark.slow
-def test_a_script_needs_no_guard_around_its_main_code(tmp_path: Path) -> None:
+def test_a_script_needs_no_guard_around_its_main_code(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(
         "import fleet2d\n"
@@ -120,27 +119,27 @@ def test_a_script_needs_no_guard_around_its_main_code(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_that_holds_too_much_memory_is_replaced() -> None:
+def test_a_worker_that_holds_too_much_memory_is_replaced():
     with LocalExecutor(1, memory_mb=1.0) as executor:
         assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)
 
 
 @pytest.mark.slow
-def test_the_process_pool_of_python_runs_scenarios() -> None:
+def test_the_process_pool_of_python_runs_scenarios():
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor:
         assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)
 
 
-def test_an_unknown_executor_is_refused() -> None:
+def test_an_unknown_executor_is_refused():
     with pytest.raises(InputError, match="give local or serial"):
         map_runs(seed_of, SEEDED, executor="cloud")  # type: ignore[arg-type]
 
 
-def test_a_study_is_stored_by_its_name() -> None:
+def test_a_study_is_stored_by_its_name():
     assert "studies/which-robot" == default_location("which robot?")
 
 
-def test_runs_in_one_home_follow_each_other_and_results_keep_their_order() -> None:
+def test_runs_in_one_home_follow_each_other_and_results_keep_their_order():
     noting = CountingExecutor()
     homes = [{"type": "synthetic", "seed": home} for home in (1, 2, 1, 2)]
     scenarios = [{**one, "floorplan": home} for one, home in zip(SEEDED, homes, strict=True)]

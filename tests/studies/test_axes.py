@@ -1,7 +1,6 @@
 """Axes: what they offer, how it is labelled, and how they refuse."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,39 +25,39 @@ def values(x_axis: Axis, name: str = "x") -> list[Any]:
     return [choice.changes[0][1] for choice in x_axis.choices(name)]
 
 
-def test_values_are_their_own_labels() -> None:
+def test_values_are_their_own_labels():
     assert [(0.3,), ("fast",)] == labels(axis(key=SPEED, values=[0.3, "fast"]))
 
 
-def test_values_with_a_type_are_called_by_it() -> None:
+def test_values_with_a_type_are_called_by_it():
     behaviors = [{"type": "patrol"}, {"type": "hangout", "source": "ltp"}]
     assert [("patrol",), ("hangout",)] == labels(axis(key="robots.astro", values=behaviors))
 
 
-def test_values_that_can_not_be_told_apart_are_numbered() -> None:
+def test_values_that_can_not_be_told_apart_are_numbered():
     lists = [[{"type": "patrol"}], [{"type": "find"}]]
     assert [("1",), ("2",)] == labels(axis(key="robots.astro.behaviors", values=lists))
 
 
-def test_a_value_can_be_set_for_several_keys() -> None:
+def test_a_value_can_be_set_for_several_keys():
     (choice,) = axis(key=[SPEED, "robots.bolt.speed"], values=[0.3]).choices("speed")
     assert [("robots", "astro", "speed"), ("robots", "bolt", "speed")] == [
         keys for keys, _ in choice.changes
     ]
 
 
-def test_two_values_of_one_label_are_refused() -> None:
+def test_two_values_of_one_label_are_refused():
     with pytest.raises(ValidationError, match="two values have the label 'slow'"):
         axis(key=SPEED, values=[0.2, 0.3, 0.4], labels=["fast", "slow", "slow"])
 
 
-def test_options_change_several_keys_each() -> None:
+def test_options_change_several_keys_each():
     x_axis = axis(options={"slow": {SPEED: 0.2}, "fast": {SPEED: 0.9, "robots.astro.radius": 0.1}})
     assert [("slow",), ("fast",)] == labels(x_axis)
     assert [1, 2] == [len(choice.changes) for choice in x_axis.choices("x")]
 
 
-def test_floor_plans_of_a_folder_are_called_by_their_files(tmp_path: Path) -> None:
+def test_floor_plans_of_a_folder_are_called_by_their_files(tmp_path):
     for name in ("b", "a"):
         (tmp_path / f"{name}.json").write_text(json.dumps(flat_document()))
     (tmp_path / "notes.txt").write_text("not a plan")
@@ -71,24 +70,24 @@ def test_floor_plans_of_a_folder_are_called_by_their_files(tmp_path: Path) -> No
     assert [("b",)] == labels(axis(floorplans=str(tmp_path / "b*.json")))
 
 
-def test_a_folder_without_floor_plans_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_floor_plans_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match="no floor plan matches"):
         axis(floorplans=str(tmp_path)).choices("home")
 
 
-def test_synthetic_homes_are_called_by_their_seeds() -> None:
+def test_synthetic_homes_are_called_by_their_seeds():
     assert [(5,), (6,)] == labels(axis(synthetic=2, first=5))
     assert [(9,), (3,)] == labels(axis(synthetic=[9, 3]))
 
 
-def test_all_personas_are_those_that_come_with_fleet2d() -> None:
+def test_all_personas_are_those_that_come_with_fleet2d():
     axis_labels = labels(axis(personas="all", user="ana"))
     assert ("retired",) in axis_labels
     assert 7 == len(axis_labels)
 
 
 @pytest.mark.parametrize("method", ["latin_hypercube", "sobol"])
-def test_samples_are_the_same_at_each_call_and_within_range(method: str) -> None:
+def test_samples_are_the_same_at_each_call_and_within_range(method):
     parameters = {
         "speed": {"key": SPEED, "low": 0.2, "high": 1.0},
         "dwell": {"key": "robots.astro.dwell", "low": 1, "high": 60, "log": True, "unit": "min"},
@@ -103,7 +102,7 @@ def test_samples_are_the_same_at_each_call_and_within_range(method: str) -> None
     assert x_axis.choices("x")[0].changes[1][1].endswith(" min")
 
 
-def test_a_latin_hypercube_fills_every_eighth_of_a_range_once() -> None:
+def test_a_latin_hypercube_fills_every_eighth_of_a_range_once():
     x_axis = axis(sample={"speed": {"key": SPEED, "low": 0, "high": 8}}, count=8)
     assert list(range(8)) == sorted(int(speed) for (speed,) in labels(x_axis))
 
@@ -119,17 +118,17 @@ def points(method: str, count: int, dimensions: int = 2) -> list[tuple[int, ...]
     ]
 
 
-def test_sobol_points_have_one_in_each_cell_of_a_grid() -> None:
+def test_sobol_points_have_one_in_each_cell_of_a_grid():
     cells = {(x // 125, y // 125) for x, y in points("sobol", 64)}
     assert 64 == len(cells)
 
 
-def test_sobol_points_of_another_number_than_a_power_of_two_are_refused() -> None:
+def test_sobol_points_of_another_number_than_a_power_of_two_are_refused():
     with pytest.raises(ScenarioError, match="count 64, not 50"):
         points("sobol", 50)
 
 
-def test_whole_numbers_reach_both_ends() -> None:
+def test_whole_numbers_reach_both_ends():
     parameter = Parameter(key="a.b", low=1, high=3, integer=True)
     assert [1, 2, 3, 3] == [parameter.at(share) for share in (0.0, 0.5, 0.9, 1.0)]
 
@@ -151,10 +150,10 @@ def test_whole_numbers_reach_both_ends() -> None:
         ),
     ],
 )
-def test_wrong_axes_are_refused(keys: dict[str, Any], message: str) -> None:
+def test_wrong_axes_are_refused(keys, message):
     with pytest.raises(ValidationError, match=message):
         axis(**keys)
 
 
-def test_every_kind_is_known_by_a_key_of_its_own() -> None:
+def test_every_kind_is_known_by_a_key_of_its_own():
     assert all(kind in cls.model_fields for kind, cls in KINDS.items())

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from tests.scenes import Cli
 from tests.studies.scenes import SPEED, base, small
 
 
 @pytest.fixture
-def fleet2d(fleet2d: Cli) -> Cli:
+def fleet2d(fleet2d):
     """The command line in a folder with a study."""
     Path("speeds.yaml").write_text(yaml.safe_dump(small(replicates=2)))
     return fleet2d
@@ -20,7 +19,7 @@ def fleet2d(fleet2d: Cli) -> Cli:
 SERIAL = ("--executor", "serial")
 
 
-def test_a_study_is_run_and_stored_by_its_name(fleet2d: Cli) -> None:
+def test_a_study_is_run_and_stored_by_its_name(fleet2d):
     code, out, err = fleet2d("study", "run", "speeds.yaml", *SERIAL)
     assert (0, "") == (code, err)
     assert out.startswith("4 of 4 variants complete in studies/speeds\n\nspeeds\n")
@@ -28,7 +27,7 @@ def test_a_study_is_run_and_stored_by_its_name(fleet2d: Cli) -> None:
     assert Path("studies/speeds/variants.parquet").exists()
 
 
-def test_json_is_one_object(fleet2d: Cli) -> None:
+def test_json_is_one_object(fleet2d):
     code, out, _ = fleet2d("study", "run", "speeds.yaml", *SERIAL, "--out", "here", "--json")
     content = json.loads(out)
     answer = content.pop("answer")
@@ -40,7 +39,7 @@ def test_json_is_one_object(fleet2d: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_a_dry_run_prints_axes_and_variants_and_writes_nothing(fleet2d: Cli) -> None:
+def test_a_dry_run_prints_axes_and_variants_and_writes_nothing(fleet2d):
     code, out, _ = fleet2d("study", "run", "speeds.yaml", "--dry-run", "--workers", "2")
     assert 0 == code
     assert f"{SPEED}: 0.3, 0.6" in out
@@ -51,13 +50,13 @@ def test_a_dry_run_prints_axes_and_variants_and_writes_nothing(fleet2d: Cli) -> 
     assert ["speeds.yaml"] == [path.name for path in Path().iterdir()]
 
 
-def test_status_tells_how_far_it_is(fleet2d: Cli) -> None:
+def test_status_tells_how_far_it_is(fleet2d):
     fleet2d("study", "run", "speeds.yaml", *SERIAL)
     expected = (0, "speeds: 4 of 4 variants complete, 0 failed, 0 to run\n", "")
     assert expected == fleet2d("study", "status", "studies/speeds")
 
 
-def test_a_variant_is_run_again_and_compared(fleet2d: Cli) -> None:
+def test_a_variant_is_run_again_and_compared(fleet2d):
     fleet2d("study", "run", "speeds.yaml", *SERIAL)
     code, out, _ = fleet2d("study", "rerun", "studies/speeds", "2", "--out", "run")
     assert 0 == code
@@ -67,7 +66,7 @@ def test_a_variant_is_run_again_and_compared(fleet2d: Cli) -> None:
     assert "give a number from 0 to 3" in err
 
 
-def test_a_variant_whose_metric_differs_is_not_reproduced(fleet2d: Cli) -> None:
+def test_a_variant_whose_metric_differs_is_not_reproduced(fleet2d):
     """With a metric that had been changed since it was said to be reproduced: the digest has none."""
     Path("own.py").write_text(
         "from pathlib import Path\nfrom fleet2d import Metric\n\nclass Own(Metric):\n"
@@ -92,7 +91,7 @@ def test_a_variant_whose_metric_differs_is_not_reproduced(fleet2d: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_a_report_is_written_beside_the_study(fleet2d: Cli) -> None:
+def test_a_report_is_written_beside_the_study(fleet2d):
     fleet2d("study", "run", "speeds.yaml", *SERIAL)
     code, out, err = fleet2d("study", "report", "studies/speeds")
     assert (0, "") == (code, err)
@@ -100,7 +99,7 @@ def test_a_report_is_written_beside_the_study(fleet2d: Cli) -> None:
     assert Path("studies/speeds/report/report.html").exists()
 
 
-def test_failures_are_printed_and_end_in_one(fleet2d: Cli) -> None:
+def test_failures_are_printed_and_end_in_one(fleet2d):
     Path("mine.py").write_text(
         "from fleet2d import Algorithm\n"
         "class Fails(Algorithm):\n"
@@ -128,12 +127,12 @@ def test_failures_are_printed_and_end_in_one(fleet2d: Cli) -> None:
         (("report", "nowhere"), "nowhere holds no study"),
     ],
 )
-def test_wrong_input_ends_in_two(fleet2d: Cli, arguments: tuple[str, ...], message: str) -> None:
+def test_wrong_input_ends_in_two(fleet2d, arguments, message):
     code, _, err = fleet2d("study", *arguments)
     assert (2, True) == (code, message in err)
 
 
-def test_a_search_prints_what_it_found_and_how_it_does_elsewhere(fleet2d: Cli) -> None:
+def test_a_search_prints_what_it_found_and_how_it_does_elsewhere(fleet2d):
     content = small(
         axes={"radius": {"key": "robots.astro.radius", "values": [0.1, 0.12, 0.15]}},
         replicates=2,
@@ -152,7 +151,7 @@ def test_a_search_prints_what_it_found_and_how_it_does_elsewhere(fleet2d: Cli) -
     assert "distance.astro on the homes held out:" in out
 
 
-def test_power_says_how_many_seeds_detect_an_effect(fleet2d: Cli) -> None:
+def test_power_says_how_many_seeds_detect_an_effect(fleet2d):
     fleet2d("study", "run", "speeds.yaml", *SERIAL)
     against = ("--against", f"{SPEED}=0.3")
     arguments = ("study", "power", "studies/speeds", "distance.astro", *against)
@@ -167,7 +166,7 @@ def test_power_says_how_many_seeds_detect_an_effect(fleet2d: Cli) -> None:
     assert ["0.6", "29"] == out.splitlines()[2].split()[:2]
 
 
-def test_power_needs_a_comparison_that_the_study_has(fleet2d: Cli) -> None:
+def test_power_needs_a_comparison_that_the_study_has(fleet2d):
     fleet2d("study", "run", "speeds.yaml", *SERIAL)
     power = ("study", "power", "studies/speeds", "distance.astro")
     assert "give --against AXIS=VALUE" in fleet2d(*power)[2]

@@ -2,7 +2,6 @@
 
 import pickle
 import time
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,7 +22,7 @@ def labels(study_design: Design, *columns: str) -> list[tuple[Any, ...]]:
     return [tuple(study_design.parameters(i)[c] for c in columns) for i in range(len(study_design))]
 
 
-def test_every_value_meets_every_other_and_every_seed() -> None:
+def test_every_value_meets_every_other_and_every_seed():
     study_design = design(axes={SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}, replicates=2)
     assert (8, (SPEED, RADIUS, "seed")) == (len(study_design), study_design.columns)
     assert [(0.3, 0.1, 0), (0.3, 0.1, 1), (0.3, 0.2, 0)] == labels(
@@ -31,17 +30,17 @@ def test_every_value_meets_every_other_and_every_seed() -> None:
     )[:3]
 
 
-def test_scenarios_have_their_values_and_their_seed() -> None:
+def test_scenarios_have_their_values_and_their_seed():
     scenario = design().scenario(4)
     assert (0.6, 1) == (scenario.robots["astro"].speed, scenario.simulation.seed)
 
 
-def test_without_replicates_the_seed_is_that_of_the_base() -> None:
+def test_without_replicates_the_seed_is_that_of_the_base():
     study_design = build_design(read_specification({"base": base()}))
     assert ([(4,)], 1) == (labels(study_design, "seed"), len(study_design))
 
 
-def test_tables_that_are_not_kept_are_not_made() -> None:
+def test_tables_that_are_not_kept_are_not_made():
     artifacts = design().scenario(0).artifacts
     assert ("off", False, False) == (
         artifacts.trajectories, artifacts.observations, artifacts.key_frames,
@@ -53,7 +52,7 @@ def test_tables_that_are_not_kept_are_not_made() -> None:
     )  # type: ignore[union-attr]
 
 
-def test_an_axis_with_a_condition_applies_there_only() -> None:
+def test_an_axis_with_a_condition_applies_there_only():
     axes = {
         "robot": {"key": "robots.astro.order", "values": ["fixed", "random"]},
         "dwell": {"key": "robots.astro.dwell", "values": [60, 90], "when": {"robot": "random"}},
@@ -63,24 +62,24 @@ def test_an_axis_with_a_condition_applies_there_only() -> None:
     assert expected == labels(study_design, "robot", "dwell")
 
 
-def test_rules_change_the_variants_that_they_name() -> None:
+def test_rules_change_the_variants_that_they_name():
     rules = [{"when": {SPEED: [0.6]}, "set": {RADIUS: 0.11}}]
     study_design = design(rules=rules, replicates=1)
     assert [0.15, 0.11] == [study_design.scenario(i).robots["astro"].radius for i in range(2)]
 
 
-def test_excluded_combinations_are_left_out() -> None:
+def test_excluded_combinations_are_left_out():
     axes = {SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}
     study_design = design(axes=axes, replicates=1, exclude=[{SPEED: 0.3, RADIUS: 0.2}])
     assert [(0.3, 0.1), (0.6, 0.1), (0.6, 0.2)] == labels(study_design, SPEED, RADIUS)
 
 
-def test_a_design_without_variants_is_refused() -> None:
+def test_a_design_without_variants_is_refused():
     with pytest.raises(ScenarioError, match="has no variants"):
         design(exclude=[{SPEED: [0.3, 0.6]}])
 
 
-def test_a_design_too_large_to_list_is_refused() -> None:
+def test_a_design_too_large_to_list_is_refused():
     many = {f"robots.astro.x{i}": list(range(60)) for i in range(5)}
     with pytest.raises(ScenarioError, match="= 2,332,800,000 variants"):
         design(axes=many)
@@ -94,7 +93,7 @@ def test_a_design_too_large_to_list_is_refused() -> None:
         ({"compare": [{"metric": "x", "against": {SPEED: 1}}]}, r"compare.0.against"),
     ],
 )
-def test_conditions_that_never_hold_are_refused(keys: dict[str, Any], message: str) -> None:
+def test_conditions_that_never_hold_are_refused(keys, message):
     with pytest.raises(ScenarioError, match=message):
         design(**keys)
 
@@ -113,9 +112,7 @@ def test_conditions_that_never_hold_are_refused(keys: dict[str, Any], message: s
         ),
     ],
 )
-def test_conditions_on_values_that_never_occur_at_once_are_refused(
-    keys: dict[str, Any], message: str
-) -> None:
+def test_conditions_on_values_that_never_occur_at_once_are_refused(keys, message):
     """A rule for a combination that `exclude` or `when` takes away set nothing, without a word."""
     axes = {
         "home": {"options": {"a": {SPEED: 0.3}, "b": {SPEED: 0.6}}},
@@ -125,32 +122,32 @@ def test_conditions_on_values_that_never_occur_at_once_are_refused(
         design(axes=axes, **keys)
 
 
-def test_two_conditions_may_exclude_the_same_variants() -> None:
+def test_two_conditions_may_exclude_the_same_variants():
     axes = {SPEED: [0.3, 0.6], RADIUS: [0.1, 0.2]}
     exclude = [{SPEED: 0.3}, {SPEED: 0.3, RADIUS: 0.2}]
     assert 2 == len(design(axes=axes, replicates=1, exclude=exclude))
 
 
-def test_an_error_in_a_scenario_names_axis_and_value() -> None:
+def test_an_error_in_a_scenario_names_axis_and_value():
     study_design = design(axes={"pace": {"key": SPEED, "values": [0.3, "quick"]}})
     with pytest.raises(ScenarioError, match=r"variant 3 \(pace = quick, seed = 0\).*axis 'pace'"):
         study_design.scenario(3)
 
 
-def test_an_error_in_a_study_file_names_its_line(tmp_path: Path) -> None:
+def test_an_error_in_a_study_file_names_its_line(tmp_path):
     file = tmp_path / "study.yaml"
     file.write_text("axes:\n  pace: {key: robots.astro.sped, values: [0.3]}\n")
     with pytest.raises(ScenarioError, match=r"axis 'pace', pace = 0.3, .*study.yaml:2.*'speed'"):
         build_design(read_specification(file)).scenario(0)
 
 
-def test_a_design_can_be_sent_to_another_process() -> None:
+def test_a_design_can_be_sent_to_another_process():
     study_design = design()
     again = pickle.loads(pickle.dumps(study_design))
     assert study_design.scenario(5).resolved() == again.scenario(5).resolved()
 
 
-def test_a_study_that_is_too_large_is_refused_at_once_with_its_size() -> None:
+def test_a_study_that_is_too_large_is_refused_at_once_with_its_size():
     speeds = [round(0.1 + i / 10_000, 4) for i in range(2000)]
     radii = [round(0.1 + i / 100_000, 5) for i in range(2000)]
     start_s = time.process_time()

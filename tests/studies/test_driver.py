@@ -18,7 +18,6 @@ from fleet2d.errors import ArtifactError, RunDirectoryError, ScenarioError
 from fleet2d.storage import files
 from fleet2d.studies import design, driver, plan, results, storage
 from fleet2d.studies.executors import LocalExecutor, SerialExecutor
-from fleet2d.studies.plan import Changed
 from fleet2d.studies.reader import open_study
 
 ROWS = {"keep": {"tables": ["room_share"]}}
@@ -41,7 +40,7 @@ class CollectingObserver(driver.Observer):
 
 
 @pytest.fixture(scope="module")
-def undisturbed_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def undisturbed_dir(tmp_path_factory):
     """A study that ran without disturbance."""
     folder = tmp_path_factory.mktemp("studies") / "whole"
     run(small(**ROWS), folder)
@@ -49,12 +48,12 @@ def undisturbed_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def copied(undisturbed_dir: Path, tmp_path: Path) -> Path:
+def copied(undisturbed_dir, tmp_path):
     """The same, to be disturbed."""
     return shutil.copytree(undisturbed_dir, tmp_path / "copied")
 
 
-def test_a_study_is_one_data_set_and_few_files(undisturbed_dir: Path) -> None:
+def test_a_study_is_one_data_set_and_few_files(undisturbed_dir):
     files = sorted(
         p.relative_to(undisturbed_dir).as_posix().partition("-")[0]
         for p in undisturbed_dir.rglob("*")
@@ -66,13 +65,13 @@ def test_a_study_is_one_data_set_and_few_files(undisturbed_dir: Path) -> None:
     ] == files  # fmt: skip
 
 
-def test_run_again_it_runs_nothing(copied: Path) -> None:
+def test_run_again_it_runs_nothing(copied):
     executor = CountingExecutor()
     counts, _ = run(small(**ROWS), copied, executor)
     assert (6, []) == (counts.complete, executor.ran)
 
 
-def test_it_goes_on_where_it_was_interrupted(undisturbed_dir: Path, tmp_path: Path) -> None:
+def test_it_goes_on_where_it_was_interrupted(undisturbed_dir, tmp_path):
     folder = tmp_path / "study"
     ran = []
     for most in (2, 1, 0, 9):
@@ -86,7 +85,7 @@ def test_it_goes_on_where_it_was_interrupted(undisturbed_dir: Path, tmp_path: Pa
     assert undisturbed.arrow("room_share").to_table() == study.arrow("room_share").to_table()
 
 
-def test_an_interrupted_study_can_be_read(tmp_path: Path) -> None:
+def test_an_interrupted_study_can_be_read(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(small(**ROWS), tmp_path / "study", CountingExecutor(2))
     study = open_study(tmp_path / "study")
@@ -96,9 +95,7 @@ def test_an_interrupted_study_can_be_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("file", ["results/000001.parquet", "tables/room_share/000001-*.parquet"])
 @pytest.mark.parametrize("harm", ["cut", "gone", "changed"])
-def test_what_is_damaged_is_run_again(
-    copied: Path, undisturbed_dir: Path, file: str, harm: str
-) -> None:
+def test_what_is_damaged_is_run_again(copied, undisturbed_dir, file, harm):
     (path,) = copied.glob(file)
     if harm == "gone":
         path.unlink()
@@ -116,7 +113,7 @@ def test_what_is_damaged_is_run_again(
 
 @pytest.mark.parametrize("file", ["variants.parquet", "scenarios.parquet", "study.json"])
 @pytest.mark.parametrize("harm", ["gone", "cut"])
-def test_what_can_be_made_again_is_made_again(copied: Path, file: str, harm: str) -> None:
+def test_what_can_be_made_again_is_made_again(copied, file, harm):
     content = (copied / file).read_bytes()
     if harm == "cut":
         os.truncate(copied / file, len(content) // 2)
@@ -127,14 +124,14 @@ def test_what_can_be_made_again_is_made_again(copied: Path, file: str, harm: str
     assert ([], content) == (executor.ran, (copied / file).read_bytes())
 
 
-def test_a_plan_that_is_gone_is_refused_as_results_would_be_of_other_variants(copied: Path) -> None:
+def test_a_plan_that_is_gone_is_refused_as_results_would_be_of_other_variants(copied):
     """Results are stored by number: renumbered variants would silently get those of others."""
     (copied / "plan.parquet").unlink()
     with pytest.raises(RunDirectoryError, match=r"plan.parquet is missing.*another --out"):
         run(small(axes={SPEED: [0.1, 0.3, 0.6]}, **ROWS), copied)
 
 
-def test_a_crash_between_a_table_and_its_results_counts_nothing_twice(copied: Path) -> None:
+def test_a_crash_between_a_table_and_its_results_counts_nothing_twice(copied):
     """Before the results name the new file of a table, and after it, the old one is there, too."""
     folder = copied / "tables/room_share"
     (file,) = folder.iterdir()
@@ -147,9 +144,7 @@ def test_a_crash_between_a_table_and_its_results_counts_nothing_twice(copied: Pa
     assert [file] == list(folder.iterdir())
 
 
-def test_a_part_that_grows_large_is_followed_by_another(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed_dir: Path
-) -> None:
+def test_a_part_that_grows_large_is_followed_by_another(tmp_path, monkeypatch, undisturbed_dir):
     monkeypatch.setattr(results, "PART_ROWS", 2)
     monkeypatch.setattr(results, "FLUSH_EVERY_S", 0.0)
     monkeypatch.setattr(results, "FLUSH_SHARE", 1e9)
@@ -161,9 +156,7 @@ def test_a_part_that_grows_large_is_followed_by_another(
     assert 6 == rows["variant"].n_unique()
 
 
-def test_a_data_set_of_many_slices_is_the_same(
-    copied: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_data_set_of_many_slices_is_the_same(copied, monkeypatch):
     monkeypatch.setattr(plan, "SLICE_ROWS", 4)
     more = small(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=4, **ROWS)
     _, study = run(more, copied)
@@ -172,9 +165,7 @@ def test_a_data_set_of_many_slices_is_the_same(
     assert_frame_equal(pl.DataFrame(stored.read()), study.variants)
 
 
-def test_a_full_disk_ends_it_and_the_same_command_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed_dir: Path
-) -> None:
+def test_a_full_disk_ends_it_and_the_same_command_goes_on(tmp_path, monkeypatch, undisturbed_dir):
     def full(path: Path) -> AbstractContextManager[int]:
         if path.parent.name == "results" and path.exists():
             raise OSError(28, "No space left on device")
@@ -192,7 +183,7 @@ def test_a_full_disk_ends_it_and_the_same_command_goes_on(
     assert digests(open_study(undisturbed_dir)) == digests(study)
 
 
-def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path) -> None:
+def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied):
     executor, observer = CountingExecutor(), CollectingObserver()
     more = small(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=4, **ROWS)
     counts, study = run(more, copied, executor, observer=observer)
@@ -202,7 +193,7 @@ def test_more_values_and_seeds_are_run_beside_those_that_are_there(copied: Path)
     assert set(digests(open_study(copied))) == set(digests(study))
 
 
-def test_results_of_another_scenario_are_refused_until_told_to_redo(copied: Path) -> None:
+def test_results_of_another_scenario_are_refused_until_told_to_redo(copied):
     longer = small(base=base("3 min"), **ROWS)
     with pytest.raises(RunDirectoryError, match=r"6 of scenarios.*no longer has.*--changed redo"):
         run(longer, copied)
@@ -214,8 +205,8 @@ def test_results_of_another_scenario_are_refused_until_told_to_redo(copied: Path
 
 @pytest.mark.parametrize(("changed", "runs"), [("redo", 6), ("keep", 0)])
 def test_results_of_other_code_are_refused_until_told_what_to_do(
-    copied: Path, monkeypatch: pytest.MonkeyPatch, changed: Changed, runs: int
-) -> None:
+    copied, monkeypatch, changed, runs
+):
     monkeypatch.setattr(design, "code_version", lambda: "another")
     with pytest.raises(RunDirectoryError, match="6 of the same scenarios, by other code"):
         run(small(**ROWS), copied)
@@ -224,16 +215,14 @@ def test_results_of_other_code_are_refused_until_told_what_to_do(
     assert (6, runs) == (counts.complete, len(executor.ran))
 
 
-def test_a_folder_with_something_else_is_refused(tmp_path: Path) -> None:
+def test_a_folder_with_something_else_is_refused(tmp_path):
     (tmp_path / "thesis.txt").write_text("precious")
     with pytest.raises(RunDirectoryError, match="holds no study"):
         run(small(), tmp_path)
 
 
 @pytest.mark.parametrize("last", ["lock", "scenarios.parquet", "plan.parquet"])
-def test_a_study_that_was_killed_while_it_began_is_run(
-    undisturbed_dir: Path, tmp_path: Path, last: str
-) -> None:
+def test_a_study_that_was_killed_while_it_began_is_run(undisturbed_dir, tmp_path, last):
     """One of a thousand kills left the plan without `study.json`, and the folder was refused."""
     written = ["lock", "scenarios.parquet", "plan.parquet", "study.json"]
     number = written.index(last) + 1
@@ -245,13 +234,13 @@ def test_a_study_that_was_killed_while_it_began_is_run(
     assert counts.complete == 6
 
 
-def test_a_plan_without_the_lock_of_a_study_is_something_else(tmp_path: Path) -> None:
+def test_a_plan_without_the_lock_of_a_study_is_something_else(tmp_path):
     (tmp_path / "plan.parquet").write_bytes(b"precious")
     with pytest.raises(RunDirectoryError, match="holds no study"):
         run(small(), tmp_path)
 
 
-def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_wrong_input_leaves_nothing_behind(tmp_path):
     with pytest.raises(ScenarioError):
         run(small(axes={SPEED: [0.3, "quick"]}), tmp_path / "study")
     axes = {"start": {"key": "users.ana.start", "values": ["attic"]}}
@@ -260,7 +249,7 @@ def test_wrong_input_leaves_nothing_behind(tmp_path: Path) -> None:
     assert [] == list(tmp_path.iterdir())
 
 
-def test_two_processes_can_not_run_the_same_study(tmp_path: Path) -> None:
+def test_two_processes_can_not_run_the_same_study(tmp_path):
     class Nested(SerialExecutor):
         def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
             with pytest.raises(RunDirectoryError, match="is being written by process"):
@@ -271,7 +260,7 @@ def test_two_processes_can_not_run_the_same_study(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def failing(tmp_path: Path) -> dict[str, Any]:
+def failing(tmp_path):
     """A study of whose variants one fails."""
     (tmp_path / "broken.py").write_text(BROKEN)
     own = {"type": f"{tmp_path.as_posix()}/broken:Fails", "period": "1 min"}
@@ -279,9 +268,7 @@ def failing(tmp_path: Path) -> dict[str, Any]:
     return {"base": base(algorithms={"own": own}), "axes": axes, "replicates": 1}
 
 
-def test_a_variant_that_fails_is_kept_with_its_error_and_does_not_stop_the_rest(
-    failing: dict[str, Any], tmp_path: Path
-) -> None:
+def test_a_variant_that_fails_is_kept_with_its_error_and_does_not_stop_the_rest(failing, tmp_path):
     counts, study = run(failing, tmp_path / "study")
     assert (2, 1) == (counts.complete, counts.failed)
     (row,) = study.failures.to_dicts()
@@ -291,23 +278,19 @@ def test_a_variant_that_fails_is_kept_with_its_error_and_does_not_stop_the_rest(
     assert 2 == study.scenario(1)["algorithms"]["own"]["at"]
 
 
-def test_with_fail_fast_the_first_failure_ends_the_study(
-    failing: dict[str, Any], tmp_path: Path
-) -> None:
+def test_with_fail_fast_the_first_failure_ends_the_study(failing, tmp_path):
     counts, _ = run(failing, tmp_path / "study", fail_fast=True)
     assert (1, 1, 1) == (counts.complete, counts.failed, counts.missing)
 
 
-def test_what_failed_is_run_again_next_time(failing: dict[str, Any], tmp_path: Path) -> None:
+def test_what_failed_is_run_again_next_time(failing, tmp_path):
     run(failing, tmp_path / "study")
     executor = CountingExecutor()
     counts, _ = run(failing, tmp_path / "study", executor)
     assert ([1], 1) == (executor.ran, counts.failed)
 
 
-def test_a_file_that_changes_during_a_study_fails_its_variants(
-    failing: dict[str, Any], tmp_path: Path
-) -> None:
+def test_a_file_that_changes_during_a_study_fails_its_variants(failing, tmp_path):
     class Meddling(SerialExecutor):
         def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
             with (tmp_path / "broken.py").open("a") as file:
@@ -321,9 +304,7 @@ def test_a_file_that_changes_during_a_study_fails_its_variants(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", some([2, 1, 4], 3))
-def test_results_are_the_same_with_any_number_of_workers(
-    undisturbed_dir: Path, tmp_path: Path, workers: int
-) -> None:
+def test_results_are_the_same_with_any_number_of_workers(undisturbed_dir, tmp_path, workers):
     counts, study = run(small(**ROWS), tmp_path / "study", LocalExecutor(workers), workers)
     assert 6 == counts.complete
     assert digests(open_study(undisturbed_dir)) == digests(study)

@@ -64,7 +64,7 @@ def run_in_a_child_and_kill(folder: Path, after_s: float, variants: int) -> None
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 @pytest.mark.filterwarnings("ignore:.*fork.*")
-def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
+def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path):
     _, undisturbed = run(LARGE, tmp_path / "undisturbed")
     chance = random.Random(16)
     folder, complete_before = tmp_path / "killed", 0
@@ -121,9 +121,7 @@ def wait_for_results(folder: Path, process: "subprocess.Popen[bytes]") -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
 @pytest.mark.parametrize("sign", some([signal.SIGINT, signal.SIGTERM, signal.SIGKILL], 2))
-def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
-    tmp_path: Path, sign: signal.Signals
-) -> None:
+def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(tmp_path, sign):
     process = start(tmp_path, "--workers", "2")
     wait_for_results(tmp_path, process)
     workers = workers_of(process)
@@ -147,7 +145,7 @@ def test_ended_by_a_signal_it_leaves_nothing_running_and_loses_nothing(
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks into /proc")
-def test_a_worker_that_dies_loses_only_what_it_ran_and_that_is_run_again(tmp_path: Path) -> None:
+def test_a_worker_that_dies_loses_only_what_it_ran_and_that_is_run_again(tmp_path):
     process = start(tmp_path, "--workers", "2")
     for _ in range(3 if THOROUGH else 1):
         wait_for_results(tmp_path, process)

@@ -46,32 +46,32 @@ def ends_of(crew: Crew, job: Any, homes: str) -> list[TaskEnd]:
         return list(itertools.chain.from_iterable(run_tasks(crew, job, queue(homes))))
 
 
-def test_a_worker_gets_the_tasks_of_a_home_together_and_the_last_home_is_shared() -> None:
+def test_a_worker_gets_the_tasks_of_a_home_together_and_the_last_home_is_shared():
     assert ["aaa", "bbb", "cc", "c"] == homes_of(queue("abcabcabc"), workers=2)
 
 
-def test_tasks_of_one_home_are_shared_among_workers() -> None:
+def test_tasks_of_one_home_are_shared_among_workers():
     assert ["aaaa", "aa", "a", "a"] == homes_of(queue("a" * 8), workers=2)
 
 
-def test_tasks_are_made_when_they_are_taken() -> None:
+def test_tasks_are_made_when_they_are_taken():
     made: list[int] = []
     group = (made.append(i) or WorkerTask(i, i, "") for i in range(300))
     TaskQueue([(300, group)]).take(1)
     assert list(range(MAX_BATCH)) == made
 
 
-def test_what_a_dead_worker_held_is_next() -> None:
+def test_what_a_dead_worker_held_is_next():
     tasks = queue("ab")
     tasks.put_back(tasks.take(2))
     assert ["a", "b"] == homes_of(tasks, workers=2)
 
 
-def test_a_worker_gets_several_homes_if_their_tasks_are_few() -> None:
+def test_a_worker_gets_several_homes_if_their_tasks_are_few():
     assert ["abc", "de", "f"] == homes_of(queue("abcdef"), workers=2)
 
 
-def test_results_come_after_a_while_and_the_rest_is_run_then() -> None:
+def test_results_come_after_a_while_and_the_rest_is_run_then():
     executor = CountingExecutor()
     ends = ends_of(Crew(executor, batch_s=0.0), str, "aab")
     assert ([0, 1, 2], 3) == (executor.ran, len(ends))
@@ -80,21 +80,21 @@ def test_results_come_after_a_while_and_the_rest_is_run_then() -> None:
     assert [0] == together.ran  # the first of each call
 
 
-def test_an_executor_of_ones_own_runs_tasks() -> None:
+def test_an_executor_of_ones_own_runs_tasks():
     with ThreadPoolExecutor(2) as threads:
         ends = run_tasks(Crew(threads, 2), number_of, queue("aab"))
         assert {0, 1, 2} == {end.payload for end in itertools.chain.from_iterable(ends)}
         assert 4 == threads.submit(pow, 2, 2).result()  # it stays open
 
 
-def test_a_task_that_fails_each_time_is_lost_and_the_others_are_not() -> None:
+def test_a_task_that_fails_each_time_is_lost_and_the_others_are_not():
     ends = ends_of(Crew(SerialAsElsewhere()), fails_at_1, "aaa")
     assert {0: 0, 1: None, 2: 2} == {end.task.number: end.payload for end in ends}
     (loss,) = (end for end in ends if end.loss is not None)
     assert (3, "number 1 in each of 3 attempts") == (loss.attempts, loss.loss)
 
 
-def test_a_broken_executor_is_told() -> None:
+def test_a_broken_executor_is_told():
     class Broken(SerialExecutor):
         def submit(self, *args: Any, **kwargs: Any) -> Any:
             raise BrokenExecutor("a process died")
@@ -130,7 +130,7 @@ def new_pages_of_an_array(task: WorkerTask) -> int:
     return faults[1] - faults[0]
 
 
-def test_garbage_is_collected_rarely_in_tasks() -> None:
+def test_garbage_is_collected_rarely_in_tasks():
     usual = gc.get_threshold()
 
     (end,) = ends_of(Crew(SerialExecutor()), collects_after, "a")
@@ -140,7 +140,7 @@ def test_garbage_is_collected_rarely_in_tasks() -> None:
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator")
-def test_workers_keep_the_memory_of_freed_arrays_for_the_next_ones() -> None:
+def test_workers_keep_the_memory_of_freed_arrays_for_the_next_ones():
     with LocalExecutor(1) as executor:
         (end,) = ends_of(Crew(executor), new_pages_of_an_array, "a")
 
@@ -186,7 +186,7 @@ class CannotBeLoaded:
 
 
 @pytest.mark.slow
-def test_a_worker_killed_while_it_sends_its_results_is_replaced(tmp_path: Path) -> None:
+def test_a_worker_killed_while_it_sends_its_results_is_replaced(tmp_path):
     """A `concurrent.futures.ProcessPoolExecutor` waits for ever for such a worker."""
     job = DiesWhileSending(tmp_path / "mark")
     ends = ends_of(Crew(LocalExecutor(1)), job, "ab")
@@ -194,20 +194,20 @@ def test_a_worker_killed_while_it_sends_its_results_is_replaced(tmp_path: Path) 
     assert all(len(end.payload) == 1_000_000 for end in ends)
 
 
-def test_a_job_that_no_worker_can_load_is_an_error_with_its_traceback() -> None:
+def test_a_job_that_no_worker_can_load_is_an_error_with_its_traceback():
     job: Any = CannotBeLoaded()
     with pytest.raises(InputError, match=r"can't be set up(.|\n)*'no job'"):
         ends_of(Crew(LocalExecutor(1)), job, "a")
 
 
 @pytest.mark.slow
-def test_a_worker_with_much_memory_is_replaced_between_two_calls() -> None:
+def test_a_worker_with_much_memory_is_replaced_between_two_calls():
     ends = ends_of(Crew(LocalExecutor(1, memory_mb=1.0), batch_s=0.0), pid_of, "abc")
     assert 3 == len({end.payload for end in ends})
 
 
 @pytest.mark.slow
-def test_memory_is_shared_among_processes_that_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_is_shared_among_processes_that_there_are(monkeypatch):
     """With 99 workers for eight runs each process was replaced after each call."""
     monkeypatch.setattr(executors, "_memory_mb", lambda: 2_000.0)
 

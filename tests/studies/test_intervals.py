@@ -47,29 +47,27 @@ def coverage(homes: int, seeds: int, home: float, seed: float, noise: float, ske
         (20, 5, 1.0, 0.5, 0.5, True),
     ],
 )
-def test_they_hold_the_truth_as_often_as_they_claim(
-    homes: int, seeds: int, home: float, seed: float, noise: float, skewed: bool
-) -> None:
+def test_they_hold_the_truth_as_often_as_they_claim(homes, seeds, home, seed, noise, skewed):
     # 95 %, within 3 standard errors of 400 studies; a little less of skewed values.
     assert (0.90 if skewed else 0.917) < coverage(homes, seeds, home, seed, noise, skewed) <= 0.99
 
 
-def test_over_values_that_have_nothing_in_common_they_are_cautious() -> None:
+def test_over_values_that_have_nothing_in_common_they_are_cautious():
     assert coverage(5, 5, 0.0, 0.0, 1.0, False) >= 0.95
 
 
-def test_the_same_values_give_the_same_interval() -> None:
+def test_the_same_values_give_the_same_interval():
     values = [0.1, 0.4, 0.2, 0.9]
     assert estimate(values) == estimate(values)
 
 
-def test_an_interval_holds_its_mean() -> None:
+def test_an_interval_holds_its_mean():
     mean = estimate([0.1, 0.4, 0.2, 0.9])
     assert mean.low < mean.mean < mean.high
     assert 0.4 == pytest.approx(mean.mean)
 
 
-def test_more_homes_make_it_narrower() -> None:
+def test_more_homes_make_it_narrower():
     generator = np.random.default_rng(1)
     of_home = generator.normal(1, 1, 40)
     few, many = (
@@ -81,14 +79,14 @@ def test_more_homes_make_it_narrower() -> None:
     assert many.high - many.low < few.high - few.low
 
 
-def test_one_value_has_no_interval() -> None:
+def test_one_value_has_no_interval():
     mean = estimate([0.5], {"home": [0], "seed": [0]})
     assert 0.5 == mean.mean
     assert math.isnan(mean.low)
     assert math.isnan(estimate([]).mean)
 
 
-def test_equal_values_do_not_tell_how_much_others_differ() -> None:
+def test_equal_values_do_not_tell_how_much_others_differ():
     for values in ([0.5, 0.5, 0.5], [0.1 + 0.2, 0.3, 0.3]):
         mean = estimate(values)
         assert math.isnan(mean.low)
@@ -96,7 +94,7 @@ def test_equal_values_do_not_tell_how_much_others_differ() -> None:
         assert "all 3 values are equal" in mean.doubt
 
 
-def test_levels_with_a_single_unit_do_not_count() -> None:
+def test_levels_with_a_single_unit_do_not_count():
     one_level = estimate([1.0, 2.0, 4.0], {"seed": [0, 1, 2]})
     assert one_level == estimate([1.0, 2.0, 4.0], {"home": ["a"] * 3, "seed": [0, 1, 2]})
 
@@ -109,7 +107,7 @@ def study_of(homes: int, effect: float) -> MeanEstimate:
     return estimate(values, levels)
 
 
-def test_how_many_homes_would_do_is_what_shows_it_four_times_in_five() -> None:
+def test_how_many_homes_would_do_is_what_shows_it_four_times_in_five():
     mean = study_of(6, 0.7)
     needed = mean.needed()
     assert "home" in needed
@@ -125,7 +123,7 @@ def test_how_many_homes_would_do_is_what_shows_it_four_times_in_five() -> None:
 
 
 @pytest.mark.parametrize("homes", [8, 15, 30])
-def test_they_hold_the_mean_of_homes_with_a_long_tail(homes: int) -> None:
+def test_they_hold_the_mean_of_homes_with_a_long_tail(homes):
     generator = np.random.default_rng(homes)
     samples = np.exp(generator.normal(0, 1, (5 * STUDIES, homes)))
     means = [estimate(values) for values in samples]
@@ -138,21 +136,21 @@ def test_they_hold_the_mean_of_homes_with_a_long_tail(homes: int) -> None:
     assert np.mean(hits) > np.mean(by_student) + 0.03
 
 
-def test_p_values_are_below_five_percent_where_intervals_exclude_zero() -> None:
+def test_p_values_are_below_five_percent_where_intervals_exclude_zero():
     generator = np.random.default_rng(3)
     for _ in range(300):
         mean = estimate(generator.exponential(1, 8) - generator.uniform(0, 1))
         assert (mean.p_value < 0.05) == mean.is_clear
 
 
-def test_p_values_of_one_value_or_of_equal_ones() -> None:
+def test_p_values_of_one_value_or_of_equal_ones():
     assert math.isnan(estimate([0.5]).p_value)
     equal = [0.5] * 6
     # Of the sign test: 2 of the 64 patterns of signs are as extreme as six of the same.
     assert (2 / 64, 1.0) == (estimate(equal).p_value, estimate([0.0, 0.0]).p_value)
 
 
-def test_a_study_of_the_size_that_is_needed_detects_the_effect() -> None:
+def test_a_study_of_the_size_that_is_needed_detects_the_effect():
     spread = study_of(6, 0.7).spread
     homes = spread.needed(0.7, "home", units={"seed": 10})
     assert homes is not None
@@ -164,7 +162,7 @@ def test_a_study_of_the_size_that_is_needed_detects_the_effect() -> None:
 @pytest.mark.parametrize(
     ("shape", "design"), some([*product(BENCHMARK["SHAPES"], BENCHMARK["DESIGNS"])], 2)
 )
-def test_intervals_that_are_told_hold_the_truth(shape: str, design: str) -> None:
+def test_intervals_that_are_told_hold_the_truth(shape, design):
     for homes in BENCHMARK["HOMES"]:
         case = BENCHMARK["Case"](shape, homes, design)
         found = BENCHMARK["coverage"](case, 150)
@@ -175,7 +173,7 @@ def test_intervals_that_are_told_hold_the_truth(shape: str, design: str) -> None
             assert 0.85 <= found.told
 
 
-def test_one_home_in_ten_that_is_eight_times_the_others_is_told_from_forty_homes_only() -> None:
+def test_one_home_in_ten_that_is_eight_times_the_others_is_told_from_forty_homes_only():
     few = BENCHMARK["coverage"](BENCHMARK["Case"]("one in ten", 10), 600)
     many = BENCHMARK["coverage"](BENCHMARK["Case"]("one in ten", 40), 600)
     assert few.contain < 0.75  # what no interval from ten homes can mend
@@ -183,14 +181,14 @@ def test_one_home_in_ten_that_is_eight_times_the_others_is_told_from_forty_homes
     assert 0.90 <= many.contain <= 0.99
 
 
-def test_a_doubt_names_the_units_and_how_many_more_would_do() -> None:
+def test_a_doubt_names_the_units_and_how_many_more_would_do():
     doubt = estimate(np.arange(10.0), {"home": range(10)}).doubt
     missed = "with 10 homes, 35 % of studies miss a kind that makes up a tenth of all"
     assert f"{missed}; 19 more" in doubt
     assert not estimate(np.arange(29.0)).doubt
 
 
-def test_few_seeds_are_doubted_only_where_they_matter() -> None:
+def test_few_seeds_are_doubted_only_where_they_matter():
     generator = np.random.default_rng(5)
     home, seed = np.divmod(np.arange(160), 4)
     of_home, of_seed = generator.normal(0, 1, 40), generator.normal(0, 1, 4)
@@ -199,7 +197,7 @@ def test_few_seeds_are_doubted_only_where_they_matter() -> None:
     assert "4 seeds" in estimate(of_home[home] + 3 * of_seed[seed], levels).doubt
 
 
-def test_many_seeds_do_not_make_up_for_few_homes() -> None:
+def test_many_seeds_do_not_make_up_for_few_homes():
     generator = np.random.default_rng(6)
     home, seed = np.divmod(np.arange(250), 50)
     doubt = estimate(generator.normal(0, 1, 250), {"home": home, "seed": seed}).doubt
@@ -207,19 +205,19 @@ def test_many_seeds_do_not_make_up_for_few_homes() -> None:
 
 
 @pytest.mark.parametrize("values", [[0.0, 0.0, 0.0, 0.4], [0.99, 1.0, 1.0, 0.2], [0.0, 1.0]])
-def test_an_interval_of_shares_is_within_0_and_1(values: list[float]) -> None:
+def test_an_interval_of_shares_is_within_0_and_1(values):
     free, limited = estimate(values), estimate(values, limits=(0.0, 1.0))
     assert free.low < 0 or free.high > 1
     assert 0 <= limited.low <= limited.mean <= limited.high <= 1
 
 
-def test_values_outside_of_their_limits_are_not_cut() -> None:
+def test_values_outside_of_their_limits_are_not_cut():
     percent = [20.0, 40.0, 90.0]
     assert estimate(percent) == estimate(percent, limits=(0.0, 1.0))
 
 
 @pytest.mark.parametrize("values", [[], [math.nan, 1.0], [1.0, math.inf]])
-def test_what_is_no_number_has_no_interval(values: list[float]) -> None:
+def test_what_is_no_number_has_no_interval(values):
     mean = estimate(values)
     assert math.isnan(mean.mean)
     assert math.isnan(mean.low)

@@ -17,7 +17,7 @@ def pilot(**keys: Any) -> Pilot:
     return Pilot(check_study(small(compare=ASKED, **keys)))
 
 
-def test_it_has_all_that_is_compared_in_each_of_some_homes_and_seeds() -> None:
+def test_it_has_all_that_is_compared_in_each_of_some_homes_and_seeds():
     homes = {f"home {n}": {"users.ana.radius": 0.2 + n / 100} for n in range(5)}
     axes = {
         SPEED: [0.2, 0.3, 0.4, 0.6],
@@ -39,7 +39,7 @@ def test_it_has_all_that_is_compared_in_each_of_some_homes_and_seeds() -> None:
         (9, "From 9 seeds it tells no amounts, and which is better only if 8 agree."),
     ],
 )
-def test_few_units_tell_only_a_direction(seeds: int, words: str) -> None:
+def test_few_units_tell_only_a_direction(seeds, words):
     tried = pilot(replicates=seeds)
     tried.run(Crew(SerialExecutor()))
     answer = tried.answer(workers=1)
@@ -47,14 +47,14 @@ def test_few_units_tell_only_a_direction(seeds: int, words: str) -> None:
     assert "in four of five studies 29 seeds show a difference of" in answer.sentences[-1]
 
 
-def test_a_pilot_of_a_study_that_compares_nothing_says_so() -> None:
+def test_a_pilot_of_a_study_that_compares_nothing_says_so():
     tried = Pilot(check_study(small(axes={}, replicates=3)))
     tried.run(Crew(SerialExecutor()))
     sentences = tried.answer(workers=1).sentences
     assert "It compares nothing; from 29 seeds on it tells means with intervals." == sentences[-1]
 
 
-def test_a_pilot_without_time_says_that_it_can_not_tell() -> None:
+def test_a_pilot_without_time_says_that_it_can_not_tell():
     tried = pilot(replicates=9)
     tried.run(Crew(SerialExecutor(), batch_s=0.0), seconds=0)
     assert 1 == len(tried.variants)

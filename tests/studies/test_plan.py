@@ -35,32 +35,32 @@ def identities(**keys: Any) -> list[str]:
     return plan(**keys).variants["identity"].to_list()
 
 
-def test_identities_are_the_same_at_each_call_and_differ_among_variants() -> None:
+def test_identities_are_the_same_at_each_call_and_differ_among_variants():
     assert identities() == identities()
     assert 6 == len(set(identities()))
 
 
-def test_identities_stay_when_other_values_come() -> None:
+def test_identities_stay_when_other_values_come():
     assert set(identities()) < set(identities(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=5))
 
 
 @pytest.mark.parametrize("change", [{"max_span": 60}, {"speedup": 1000}])
-def test_what_changes_no_result_changes_no_identity(change: dict[str, Any]) -> None:
+def test_what_changes_no_result_changes_no_identity(change):
     assert identities() == identities(base=base(simulation=change))
 
 
-def test_what_changes_results_changes_identities() -> None:
+def test_what_changes_results_changes_identities():
     assert not set(identities()) & set(identities(base=base("3 min")))
 
 
-def test_another_order_of_robots_is_another_scenario() -> None:
+def test_another_order_of_robots_is_another_scenario():
     robots = {name: {"type": "patrol", "camera": {"range": [0, 4]}} for name in ("astro", "bolt")}
     other = dict(reversed(robots.items()))
 
     assert not set(identities(base=base(robots=robots))) & set(identities(base=base(robots=other)))
 
 
-def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path: Path) -> None:
+def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path):
     module = tmp_path / "mine.py"
     text = "from fleet2d import Algorithm\nclass Nothing(Algorithm):\n    pass\n"
     module.write_text(text)
@@ -72,12 +72,12 @@ def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path: Path) -> None:
     assert first_hash != input_hash(scenario)
 
 
-def test_the_code_has_a_version() -> None:
+def test_the_code_has_a_version():
     assert code_version().startswith("fleet2d ")
     assert code_version() == code_version()
 
 
-def test_only_packages_that_run_or_show_simulations_are_no_part_of_that_version() -> None:
+def test_only_packages_that_run_or_show_simulations_are_no_part_of_that_version():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     layers = project["tool"]["importlinter"]["contracts"][0]["layers"]
     above_the_engine = " | ".join(layers[: layers.index("engine")]).split(" | ")
@@ -85,7 +85,7 @@ def test_only_packages_that_run_or_show_simulations_are_no_part_of_that_version(
     assert sorted({*above_the_engine} - {"homes"}) == sorted(_LEAVES)
 
 
-def test_all_wrong_variants_are_told_at_once_without_repetition() -> None:
+def test_all_wrong_variants_are_told_at_once_without_repetition():
     axes = {"pace": {"key": SPEED, "values": [0.3, "quick", -1]}}
     with pytest.raises(ScenarioError) as caught:
         plan(axes=axes)
@@ -95,12 +95,12 @@ def test_all_wrong_variants_are_told_at_once_without_repetition() -> None:
     assert "pace = -1" in lines[1]
 
 
-def test_who_can_not_stand_in_a_home_is_found_before_the_first_run() -> None:
+def test_who_can_not_stand_in_a_home_is_found_before_the_first_run():
     with pytest.raises(ScenarioError, match=r"variant 3 \(start = attic"):
         check_setups(plan(axes={"start": ATTIC}), Crew(SerialExecutor()))
 
 
-def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
+def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes():
     axes = {
         "home": {"synthetic": 2},
         SPEED: [0.1, 0.2, 0.3, 0.4],
@@ -114,9 +114,7 @@ def test_each_home_meets_each_choice_in_as_few_set_ups_as_that_takes() -> None:
         assert 8 == len({(row["home"], row[column]) for row in setups})
 
 
-def test_of_a_fleet_the_first_homes_are_set_up_before_its_first_run(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_of_a_fleet_the_first_homes_are_set_up_before_its_first_run(monkeypatch):
     monkeypatch.setattr(plans, "FLEET_HOMES", 2)
     lives = {"population": 4, "homes": [{"synthetic": 40}]}
     study_plan = plan(axes={"robot": lives, SPEED: [0.1, 0.2]}, replicates=1)
@@ -128,7 +126,7 @@ def test_of_a_fleet_the_first_homes_are_set_up_before_its_first_run(
     assert 2 == checked["home_key"].n_unique()
 
 
-def test_two_variants_with_the_same_scenario_are_refused() -> None:
+def test_two_variants_with_the_same_scenario_are_refused():
     axes = {SPEED: [0.3], "again": {"key": SPEED, "values": [0.4, 0.5], "when": {}}}
     rules = [{"set": {SPEED: 0.2}}]
     with pytest.raises(ScenarioError, match="are the same scenario"):
@@ -136,16 +134,16 @@ def test_two_variants_with_the_same_scenario_are_refused() -> None:
 
 
 @pytest.mark.parametrize("table", ["room_share", "observations", "explored.astro"])
-def test_tables_that_variants_have_can_be_kept(table: str) -> None:
+def test_tables_that_variants_have_can_be_kept(table):
     assert check_study(small(keep={"tables": [table]}))
 
 
-def test_a_table_that_no_variant_has_is_refused() -> None:
+def test_a_table_that_no_variant_has_is_refused():
     with pytest.raises(ScenarioError, match="did you mean 'room_share'"):
         check_study(small(keep={"tables": ["rom_share"]}))
 
 
-def test_variants_that_share_a_home_have_its_key() -> None:
+def test_variants_that_share_a_home_have_its_key():
     homes = {"home": {"synthetic": 2}}
     users = {"users": {"ana": {"type": "meander"}}}
     study_plan = plan(axes=homes, base=base() | users, replicates=2)
@@ -153,7 +151,7 @@ def test_variants_that_share_a_home_have_its_key() -> None:
     assert keys[0] == keys[1] != keys[2] == keys[3]
 
 
-def test_own_components_run_in_a_study() -> None:
+def test_own_components_run_in_a_study():
     own = {"share": {"type": f"{OWN}:Share", "period": "1 min"}}
     assert check_study(small(base=base(algorithms=own), keep={"tables": ["share"]}))
 
@@ -182,9 +180,7 @@ def test_own_components_run_in_a_study() -> None:
         ({"keep": {"tables": ["rooms_share"]}}, "keep.tables.*did you mean 'room_share'"),
     ],
 )
-def test_what_no_variant_has_is_refused_before_the_first_run(
-    keys: dict[str, Any], message: str
-) -> None:
+def test_what_no_variant_has_is_refused_before_the_first_run(keys, message):
     """`keep: {metrics: [sigthings.*]}` kept nothing, and the study ended without a word."""
     with pytest.raises(ScenarioError, match=message):
         check_study(small(**keys))
@@ -198,16 +194,14 @@ def test_what_no_variant_has_is_refused_before_the_first_run(
         ("compare:\n- metric: sigthings.ana\n  against: {seed: 4}\n", r"2: compare\.0\.metric: no"),
     ],
 )
-def test_a_name_that_no_variant_has_is_told_with_its_line(
-    tmp_path: Path, keys: str, place: str
-) -> None:
+def test_a_name_that_no_variant_has_is_told_with_its_line(tmp_path, keys, place):
     (tmp_path / "study.yaml").write_text(keys)
     with pytest.raises(ScenarioError, match=rf"study\.yaml:{place} variant has"):
         check_study(tmp_path / "study.yaml")
 
 
 @pytest.mark.parametrize("pattern", ["*", "sight*", "*.ana", "sightings.a*", "[sd]*.ana", "d*.as*"])
-def test_patterns_that_fit_are_kept(pattern: str) -> None:
+def test_patterns_that_fit_are_kept(pattern):
     assert check_study(small(keep={"metrics": [pattern]})) is not None
 
 
@@ -219,17 +213,17 @@ def test_patterns_that_fit_are_kept(pattern: str) -> None:
         {"key": "simulation", "values": [{"seed": 1}, {}]},
     ],
 )
-def test_a_seed_of_an_axis_is_refused_as_replicates_would_replace_it(axis: dict[str, Any]) -> None:
+def test_a_seed_of_an_axis_is_refused_as_replicates_would_replace_it(axis):
     with pytest.raises(ScenarioError, match=r"simulation.seed.*replicates: \[1\]"):
         check_study(small(axes={"life": axis}))
 
 
-def test_a_seed_of_a_rule_is_refused() -> None:
+def test_a_seed_of_a_rule_is_refused():
     with pytest.raises(ScenarioError, match=r"rules\.0: sets simulation\.seed"):
         check_study(small(rules=[{"set": {"simulation.seed": 3}}]))
 
 
-def test_variants_without_a_metric_are_noted(tmp_path: Path) -> None:
+def test_variants_without_a_metric_are_noted(tmp_path):
     notes: list[str] = []
 
     class Notes(Observer):
@@ -246,6 +240,6 @@ def test_variants_without_a_metric_are_noted(tmp_path: Path) -> None:
     assert not any("distance" in note for note in notes)
 
 
-def test_equal_seeds_are_refused() -> None:
+def test_equal_seeds_are_refused():
     with pytest.raises(ScenarioError, match=r"variant 0 .* and variant 2 .* are the same scenario"):
         plan(replicates=[7, 8, 7])

@@ -46,7 +46,7 @@ def table(folder: Path, text: str) -> str:
     return str(path)
 
 
-def test_a_life_is_drawn_once_for_its_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_life_is_drawn_once_for_its_scenario(monkeypatch):
     lives = design()
     drawn: list[int] = []
     draw_life = Draw.life
@@ -58,7 +58,7 @@ def test_a_life_is_drawn_once_for_its_scenario(monkeypatch: pytest.MonkeyPatch) 
     assert len(drawn) <= 2
 
 
-def test_each_life_has_its_home_its_people_and_its_seed_in_all_settings(tmp_path: Path) -> None:
+def test_each_life_has_its_home_its_people_and_its_seed_in_all_settings(tmp_path):
     study = fleet()
     study["axes"]["robots.astro.speed"] = [0.3, 0.6]
     _, found = run(study, tmp_path / "fleet")
@@ -75,9 +75,7 @@ def test_each_life_has_its_home_its_people_and_its_seed_in_all_settings(tmp_path
     assert (3, 3) == paired.select("pairs", "n_robot").row(0)
 
 
-def test_a_larger_population_begins_with_the_same_lives_and_runs_only_the_others(
-    tmp_path: Path,
-) -> None:
+def test_a_larger_population_begins_with_the_same_lives_and_runs_only_the_others(tmp_path):
     run(fleet(2), tmp_path / "fleet")
     executor = CountingExecutor()
     counts, _ = run(fleet(3), tmp_path / "fleet", executor)
@@ -87,13 +85,13 @@ def test_a_larger_population_begins_with_the_same_lives_and_runs_only_the_others
     assert 0 not in executor.ran[-1:]
 
 
-def test_replicates_of_lives_have_seeds_that_no_other_life_has() -> None:
+def test_replicates_of_lives_have_seeds_that_no_other_life_has():
     study = {**fleet(10), "replicates": 3}
     lives = build_design(read_specification(study))
     assert 30 == len({lives.parameters(i)["seed"] for i in range(len(lives))})
 
 
-def test_rows_of_a_table_are_drawn_by_their_weights_with_all_their_columns(tmp_path: Path) -> None:
+def test_rows_of_a_table_are_drawn_by_their_weights_with_all_their_columns(tmp_path):
     text = (
         "household,bedrooms,area_m2,region,robots.astro.speed,share\n"
         "retired,1,40..60,north,0.3,3\n"
@@ -115,9 +113,7 @@ def test_rows_of_a_table_are_drawn_by_their_weights_with_all_their_columns(tmp_p
         assert 40 <= plan.get("area_m2", 50) <= 60
 
 
-def test_lives_whose_homes_are_not_as_their_rows_say_are_left_out_and_counted(
-    tmp_path: Path,
-) -> None:
+def test_lives_whose_homes_are_not_as_their_rows_say_are_left_out_and_counted(tmp_path):
     text = "household,region,rooms\nretired,town,..6\nstudent,country,7..\n"
     axis = PopulationAxis(population=4, homes=SYNTHETIC, table=table(tmp_path, text))
 
@@ -139,14 +135,12 @@ def test_lives_whose_homes_are_not_as_their_rows_say_are_left_out_and_counted(
         ("home\n0\n777\n", {}, "row 2: there is no home '777'"),
     ],
 )
-def test_a_table_that_can_not_be_drawn_from_is_refused(
-    tmp_path: Path, text: str, keys: dict[str, Any], words: str
-) -> None:
+def test_a_table_that_can_not_be_drawn_from_is_refused(tmp_path, text, keys, words):
     with pytest.raises(ScenarioError, match=words):
         draw(table=table(tmp_path, text), **keys)
 
 
-def test_conditions_count_what_they_leave_out() -> None:
+def test_conditions_count_what_they_leave_out():
     lives = design(count=4, where={"people": 2, "rooms": "..9", "has": ["bathroom"]})
 
     assert {2} == {*lives.labels["people"]}
@@ -168,20 +162,18 @@ def test_conditions_count_what_they_leave_out() -> None:
         ({"romms": 3}, "no 'romms': did you mean 'rooms'"),
     ],
 )
-def test_conditions_that_leave_nothing_or_make_no_sense_are_told(
-    where: dict[str, Any], words: str
-) -> None:
+def test_conditions_that_leave_nothing_or_make_no_sense_are_told(where, words):
     with pytest.raises(Fleet2DError, match=words):
         design(count=1, where=where)
 
 
-def test_all_homes_that_can_not_be_are_told_at_once_before_the_first_run() -> None:
+def test_all_homes_that_can_not_be_are_told_at_once_before_the_first_run():
     homes = [{"synthetic": 9, "settings": {"area_m2": 20, "bedrooms": 8}}]
     with pytest.raises(ScenarioError, match=r"life 0 .home = 0.: .* 4 more likewise: life 1"):
         design(count=5, homes=homes)
 
 
-def test_a_mistake_beside_the_population_is_told_before_any_home_is_built() -> None:
+def test_a_mistake_beside_the_population_is_told_before_any_home_is_built():
     study = fleet(homes=[{"synthetic": 9, "settings": {"area_m2": 20, "bedrooms": 8}}])
     study["axes"]["robots.astro.sped"] = [1]
     with pytest.raises(ScenarioError, match="unknown key 'sped'"):
@@ -197,11 +189,11 @@ def test_a_mistake_beside_the_population_is_told_before_any_home_is_built() -> N
         ({name: {"type": "routine", "household": COUPLE} for name in ("ana", "ben")}, 1),
     ],
 )
-def test_couples_and_pairs_of_children_share_bedrooms(household: Any, needed: int) -> None:
+def test_couples_and_pairs_of_children_share_bedrooms(household, needed):
     assert needed == bedrooms_needed(household)
 
 
-def test_homes_of_files_are_chosen_among_those_that_fit_the_household(tmp_path: Path) -> None:
+def test_homes_of_files_are_chosen_among_those_that_fit_the_household(tmp_path):
     document = flat_document()
     for bedrooms in (1, 3):
         kinds = iter(["bedroom"] * bedrooms + ["kitchen"] * 9)
@@ -219,7 +211,7 @@ def test_homes_of_files_are_chosen_among_those_that_fit_the_household(tmp_path: 
     assert {(1, "flat1"), (1, "flat3"), (3, "flat3")} == homes
 
 
-def test_another_fleet_in_the_same_folder_is_told_and_nothing_is_lost(tmp_path: Path) -> None:
+def test_another_fleet_in_the_same_folder_is_told_and_nothing_is_lost(tmp_path):
     run(fleet(2), tmp_path / "fleet")
     with pytest.raises(RunDirectoryError, match="2 of scenarios that the study no longer has"):
         run(fleet(2, seed=5), tmp_path / "fleet")
@@ -228,13 +220,13 @@ def test_another_fleet_in_the_same_folder_is_told_and_nothing_is_lost(tmp_path: 
     assert 2 == counts.complete
 
 
-def test_what_is_left_out_is_noted_and_stored(tmp_path: Path) -> None:
+def test_what_is_left_out_is_noted_and_stored(tmp_path):
     observer = CollectingObserver()
     _, study = run(fleet(1, where={"people": 2}), tmp_path / "fleet", observer=observer)
     assert "people is not 2" in study.meta.notes
 
 
-def test_a_cell_longer_than_a_name_of_a_file_is_no_file(tmp_path: Path) -> None:
+def test_a_cell_longer_than_a_name_of_a_file_is_no_file(tmp_path):
     """Data sets looked whether cells of key paths name files, and ended in a traceback."""
     log = tmp_path / "log.csv"
     log.write_text("")
@@ -243,7 +235,7 @@ def test_a_cell_longer_than_a_name_of_a_file_is_no_file(tmp_path: Path) -> None:
     assert [Path(census), log] == draw(table=census).files
 
 
-def test_a_column_that_is_almost_another_one_is_noted(tmp_path: Path) -> None:
+def test_a_column_that_is_almost_another_one_is_noted(tmp_path):
     """A column `wieght` labelled lives, which all were drawn with equal chances."""
     census = table(tmp_path, "household,wieght,age,robots.astro.speed\nretired,1,70,0.3\n")
     _, study = run(fleet(1, households=[], table=census), tmp_path / "fleet")
@@ -255,9 +247,7 @@ def test_a_column_that_is_almost_another_one_is_noted(tmp_path: Path) -> None:
     assert note in "\n".join(plan_dataset({"base": BASE, "splits": {"train": split}}).left_out)
 
 
-def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(monkeypatch):
     """A fleet of 2,000 was refused, as for two of its homes no layout was found."""
     built = iter(range(100))
 
@@ -272,9 +262,7 @@ def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(
     assert f"robot: 2 left out: 2 ({population.NO_LAYOUT})" == lives.words
 
 
-def test_a_fleet_of_which_no_home_has_a_layout_is_refused_with_the_reason(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_fleet_of_which_no_home_has_a_layout_is_refused_with_the_reason(monkeypatch):
     def facts_of(*_: Any) -> HomeFeatures:
         raise NoLayoutError("no synthetic home was found: ask for more or less area")
 
@@ -283,7 +271,7 @@ def test_a_fleet_of_which_no_home_has_a_layout_is_refused_with_the_reason(
         find_lives(PopulationAxis(population=3, homes=SYNTHETIC), "robot", Document(BASE))
 
 
-def test_data_sets_draw_and_leave_out_as_studies_do(tmp_path: Path) -> None:
+def test_data_sets_draw_and_leave_out_as_studies_do(tmp_path):
     text = "household,weight\nretired,1\nstudent + student,1\n"
     split = {
         "runs": 4,
@@ -302,5 +290,5 @@ def test_data_sets_draw_and_leave_out_as_studies_do(tmp_path: Path) -> None:
     assert "household is not" in words
 
 
-def test_members_have_names_of_their_own() -> None:
+def test_members_have_names_of_their_own():
     assert ["ana", "ben"] == [*members_of(["retired", "student"])]

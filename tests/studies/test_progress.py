@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import pytest
 from rich.progress import Progress
 
 from fleet2d.studies import progress
@@ -11,9 +10,7 @@ from fleet2d.studies.progress import BarObserver
 from fleet2d.studies.results import VariantResult
 
 
-def test_a_bar_counts_what_is_complete_and_names_rate_and_failures(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_bar_counts_what_is_complete_and_names_rate_and_failures(monkeypatch):
     now_s = 100.0
     monkeypatch.setattr(progress.time, "monotonic", lambda: now_s)
     bar = Progress(disable=True)

@@ -3,8 +3,6 @@
 import importlib
 import os
 import sys
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,7 +19,7 @@ pytestmark = [
 
 
 @pytest.fixture
-def cluster() -> Iterator[Any]:
+def cluster():
     """A cluster of a head without cores and two nodes with one each."""
     from ray.cluster_utils import Cluster
 
@@ -47,9 +45,7 @@ class KillsANode(Observer):
             self.cluster.remove_node(self.cluster.nodes_to_kill[0], allow_graceful=False)
 
 
-def test_a_node_that_dies_loses_only_what_it_ran(
-    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_node_that_dies_loses_only_what_it_ran(cluster, tmp_path, monkeypatch):
     # Runs take longer than a node takes to die: one that had just finished would lose nothing.
     study = small(base=base("4 days"), replicates=5)
     (recipe,) = [each for each in blocks(ROOT / "docs/studies.md") if each.title == "ray_study.py"]

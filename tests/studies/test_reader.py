@@ -21,7 +21,7 @@ SIGHTINGS = "sightings.ana"
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+def study(tmp_path_factory):
     keys = {
         "keep": {"tables": ["room_share", "observations"]},
         "compare": [{"metric": SIGHTINGS, "against": {SPEED: 0.3}}],
@@ -30,7 +30,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     return run(small(**keys), tmp_path_factory.mktemp("study") / "speeds")[1]
 
 
-def test_variants_have_parameters_status_time_digest_and_metrics(study: Study) -> None:
+def test_variants_have_parameters_status_time_digest_and_metrics(study):
     frame = study.variants
     assert [SPEED, "seed", "status", "digest", "wall_s"] == [
         c for c in frame.columns if c in (SPEED, "seed", "status", "digest", "wall_s")
@@ -40,7 +40,7 @@ def test_variants_have_parameters_status_time_digest_and_metrics(study: Study) -
     assert frame[SIGHTINGS].is_between(0, 1).all()
 
 
-def test_opening_loads_neither_the_simulator_nor_pandas(study: Study) -> None:
+def test_opening_loads_neither_the_simulator_nor_pandas(study):
     code = (
         "import sys, fleet2d\n"
         f"assert len(fleet2d.open_study({study.location!r}).variants) == 6\n"
@@ -52,7 +52,7 @@ def test_opening_loads_neither_the_simulator_nor_pandas(study: Study) -> None:
 
 
 @pytest.mark.slow
-def test_running_does_not_load_pandas(tmp_path: Path) -> None:
+def test_running_does_not_load_pandas(tmp_path):
     code = (
         "import sys, fleet2d\n"
         "base = {'extends': 'bundled:paper', 'simulation': {'duration': '1 min'}}\n"
@@ -63,13 +63,13 @@ def test_running_does_not_load_pandas(tmp_path: Path) -> None:
     assert "False\n" == done.stdout
 
 
-def test_a_table_of_all_variants_comes_with_their_parameters(study: Study) -> None:
+def test_a_table_of_all_variants_comes_with_their_parameters(study):
     rows = study.polars("room_share").collect()
     assert {"variant", "step", "time", "user", "room", SPEED, "seed"} <= set(rows.columns)
     assert set(range(6)) == set(rows["variant"])
 
 
-def test_rows_are_those_of_the_run_itself(study: Study) -> None:
+def test_rows_are_those_of_the_run_itself(study):
     run = study.rerun(2)
     expected = run.polars("room_share").with_columns(pl.col(pl.Categorical).cast(pl.String))
     rows = pl.from_arrow(pa_rows(study, 2)).drop("variant")  # type: ignore[union-attr]
@@ -82,11 +82,11 @@ def pa_rows(study: Study, variant: int):  # type: ignore[no-untyped-def]
     return study.arrow("room_share").to_table(filter=pc.field("variant") == variant)
 
 
-def test_variants_are_a_pandas_frame_too(study: Study) -> None:
+def test_variants_are_a_pandas_frame_too(study):
     assert 6 == len(study.pandas())
 
 
-def test_any_parquet_reader_reads_it(study: Study) -> None:
+def test_any_parquet_reader_reads_it(study):
     assert 6 == pq.read_table(Path(study.location) / "variants.parquet").num_rows
     folder = Path(study.location) / "tables/room_share"
     rows = study.polars("room_share").collect().height
@@ -95,12 +95,12 @@ def test_any_parquet_reader_reads_it(study: Study) -> None:
     assert [(rows,)] == duckdb.sql(f"select count(*) from '{folder}/*.parquet'").fetchall()
 
 
-def test_a_table_that_is_not_kept_is_named(study: Study) -> None:
+def test_a_table_that_is_not_kept_is_named(study):
     with pytest.raises(ArtifactError, match="did you mean 'room_share'"):
         study.arrow("roomshare")
 
 
-def test_a_metric_or_axis_that_is_not_there_is_named(study: Study) -> None:
+def test_a_metric_or_axis_that_is_not_there_is_named(study):
     with pytest.raises(InputError, match=f"did you mean '{SIGHTINGS}'"):
         study.paired("sighting.ana", {SPEED: 0.3})
     with pytest.raises(InputError, match="did you mean 'seed'"):
@@ -111,7 +111,7 @@ def test_a_metric_or_axis_that_is_not_there_is_named(study: Study) -> None:
         study.paired(SIGHTINGS, {"sped": 0.4})
 
 
-def test_what_numbers_can_be_and_which_are_better_is_known(study: Study) -> None:
+def test_what_numbers_can_be_and_which_are_better_is_known(study):
     assert (0, 1) == study.limits("sightings.ana")
     assert (0, math.inf) == study.limits("distance.astro")
     assert (-math.inf, math.inf) == study.limits("unknown")
@@ -120,9 +120,7 @@ def test_what_numbers_can_be_and_which_are_better_is_known(study: Study) -> None
     ]
 
 
-def test_a_study_whose_variants_all_failed_has_no_answers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_study_whose_variants_all_failed_has_no_answers(tmp_path, monkeypatch):
     def fails(*_: Any) -> None:
         raise ComponentError("no more memory")
 
@@ -133,19 +131,19 @@ def test_a_study_whose_variants_all_failed_has_no_answers(
         failed.paired("sightings.ana", {SPEED: 0.3})
 
 
-def test_a_scenario_of_a_study_runs_as_any_other(study: Study) -> None:
+def test_a_scenario_of_a_study_runs_as_any_other(study):
     assert 0.6 == study.scenario(5)["robots"]["astro"]["speed"]
     with pytest.raises(RunDirectoryError, match="no variant 99"):
         study.scenario(99)
 
 
-def test_a_variant_can_be_stored_with_more_artifacts(study: Study, tmp_path: Path) -> None:
+def test_a_variant_can_be_stored_with_more_artifacts(study, tmp_path):
     run = study.rerun(0, tmp_path / "run", artifacts={"events": True})
     assert "events" in run.tables
     assert (tmp_path / "run/manifest.json").exists()
 
 
-def test_a_folder_without_a_study_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_a_study_is_refused(tmp_path):
     with pytest.raises(RunDirectoryError, match="holds no study"):
         open_study(tmp_path)
 
@@ -159,16 +157,14 @@ def test_a_folder_without_a_study_is_refused(tmp_path: Path) -> None:
         ({"compare": [{"metric": 3}]}, "PairedComparison"),
     ],
 )
-def test_a_description_with_other_types_is_damaged(
-    study: Study, tmp_path: Path, change: dict[str, Any], reason: str
-) -> None:
+def test_a_description_with_other_types_is_damaged(study, tmp_path, change, reason):
     content = json.loads(Path(study.location, "study.json").read_text())
     (tmp_path / "study.json").write_text(json.dumps({**content, **change}))
     with pytest.raises(RunDirectoryError, match=rf"study\.json is damaged \(.*{reason}"):
         _ = open_study(tmp_path).comparisons
 
 
-def test_paired_compares_the_same_seeds(study: Study) -> None:
+def test_paired_compares_the_same_seeds(study):
     (row,) = study.paired(SIGHTINGS, {SPEED: 0.3}).to_dicts()
     values = study.variants.pivot(SPEED, index="seed", values=SIGHTINGS)
     differences = values["0.6"] - values["0.3"]
@@ -177,20 +173,20 @@ def test_paired_compares_the_same_seeds(study: Study) -> None:
     assert row["low"] < row["difference"] < row["high"]
 
 
-def test_values_of_a_population_can_be_compared(study: Study) -> None:
+def test_values_of_a_population_can_be_compared(study):
     """Seeds are units of every other comparison, but not of one between seeds."""
     table = study.paired("sightings.ana", {"seed": 0})
     assert "n_seed" not in table.columns
     assert len(table) == study.variants["seed"].n_unique() - 1
 
 
-def test_a_summary_has_a_row_for_each_value(study: Study) -> None:
+def test_a_summary_has_a_row_for_each_value(study):
     table = study.summary(SIGHTINGS, [SPEED])
     assert [0.3, 0.6] == table[SPEED].to_list()
     assert (table["low"] <= table["mean"]).all()
 
 
-def test_shares_of_the_variance_are_shares(study: Study) -> None:
+def test_shares_of_the_variance_are_shares(study):
     table = study.shares(SIGHTINGS)
     assert table["share"].is_between(0, 1).all()
     assert {SPEED, "seed", "residual"} == set(table["source"])

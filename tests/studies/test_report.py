@@ -2,13 +2,11 @@
 
 import html
 import re
-from pathlib import Path
 
 import polars as pl
 import pytest
 from tests.studies.scenes import SPEED, base, run, small
 
-from fleet2d.studies.reader import Study
 from fleet2d.studies.report import short_names, write_report
 
 SIGHTINGS = "sightings.ana"
@@ -16,7 +14,7 @@ LONG = "a_home_with_a_name_that_is_too_long_"
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+def study(tmp_path_factory):
     """Two speeds and two dwells in two homes of long names, with three seeds."""
     folder = tmp_path_factory.mktemp("study")
     home = base()["floorplan"]
@@ -44,12 +42,12 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
 
 
 @pytest.fixture(scope="module")
-def page(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def page(study, tmp_path_factory):
     return write_report(study, tmp_path_factory.mktemp("report"))
 
 
 @pytest.mark.slow
-def test_a_report_is_one_page_with_its_figures(study: Study, page: Path, tmp_path: Path) -> None:
+def test_a_report_is_one_page_with_its_figures(study, page, tmp_path):
     text = page.read_text()
     assert "Does a fast robot see more?" in text
     assert "against 0.3" in text
@@ -65,7 +63,7 @@ def test_a_report_is_one_page_with_its_figures(study: Study, page: Path, tmp_pat
         )
 
 
-def test_a_report_says_what_is_measured_in_which_unit_and_how(page: Path) -> None:
+def test_a_report_says_what_is_measured_in_which_unit_and_how(page):
     text = page.read_text()
     assert "<td class=text>sightings.ana [share of time at home]</td>" in text
     assert "distance.astro [m a day]" in (page.parent / "figures/compare-2.svg").read_text()
@@ -76,26 +74,24 @@ def test_a_report_says_what_is_measured_in_which_unit_and_how(page: Path) -> Non
     assert "The camera has no noise." in text
 
 
-def test_homes_have_a_picture_within_each_value_of_another_axis(page: Path) -> None:
+def test_homes_have_a_picture_within_each_value_of_another_axis(page):
     figure = (page.parent / "figures/compare-2-home.svg").read_text()
     assert figure.count("dwell = 0") == figure.count("dwell = 1 min") > 0
     assert "dwell" not in (page.parent / "figures/compare-1-home.svg").read_text()
 
 
-def test_shares_that_overlap_say_so(study: Study, page: Path) -> None:
+def test_shares_that_overlap_say_so(study, page):
     overlapping = [m for m in study.metrics if study.shares(m)["share"].sum() > 1.01]
     assert ["room_share.ana.bathroom_1"] == overlapping  # of half of the variants only
     assert 1 == page.read_text().count("Shares overlap")
 
 
-def test_homes_of_long_names_have_short_ones_that_are_listed(page: Path) -> None:
+def test_homes_of_long_names_have_short_ones_that_are_listed(page):
     text = page.read_text()
     assert f"<td class=text>…long_a</td><td class=text>{LONG}a</td>" in text
 
 
-def test_the_answer_comes_first_and_all_numbers_stand_in_one_table(
-    study: Study, page: Path
-) -> None:
+def test_the_answer_comes_first_and_all_numbers_stand_in_one_table(study, page):
     text = page.read_text()
     answer = study.answer
     assert 2 <= len(answer.sentences) <= 6
@@ -106,22 +102,20 @@ def test_the_answer_comes_first_and_all_numbers_stand_in_one_table(
     assert 1 == text.count("<h2>All numbers</h2>")
 
 
-def test_tables_are_files_of_csv(page: Path) -> None:
+def test_tables_are_files_of_csv(page):
     table = pl.read_csv(page.parent / "tables/compare-2.csv")
     assert [SPEED, "dwell", "mean", "reference", "difference"] == table.columns[:5]
     assert {"p", "p_holm", "effect_size", "verdict", "n_home"} <= set(table.columns)
 
 
-def test_p_values_are_corrected_over_all_comparisons(study: Study, page: Path) -> None:
+def test_p_values_are_corrected_over_all_comparisons(study, page):
     tables = [pl.read_csv(page.parent / f"tables/compare-{n}.csv") for n in (1, 2, 3)]
     smallest = min(table["p"].min() for table in tables)  # type: ignore[type-var]
     corrected = min(table["p_holm"].min() for table in tables)  # type: ignore[type-var]
     assert corrected == pytest.approx(min(1, 4 * smallest))  # type: ignore[operator]
 
 
-def test_only_differences_that_are_clear_after_correction_are_bold(
-    study: Study, page: Path
-) -> None:
+def test_only_differences_that_are_clear_after_correction_are_bold(study, page):
     text = page.read_text()
     tables = [pl.read_csv(page.parent / f"tables/compare-{n}.csv") for n in (1, 2, 3)]
     rows = [row for table in tables for row in table.to_dicts()]
@@ -132,6 +126,6 @@ def test_only_differences_that_are_clear_after_correction_are_bold(
     assert "<td>can&#x27;t tell</td>" in text
 
 
-def test_short_names_are_unique() -> None:
+def test_short_names_are_unique():
     names = short_names(["658e5214673c7a4e25b458e5", "658e5214673d7a4e25b458e6", "short"])
     assert ["…b458e5", "…b458e6", "…short"] == list(names.values())

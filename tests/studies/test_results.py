@@ -31,7 +31,7 @@ def result(number: int, status: Any = "complete", rows: Any = None, **metrics: A
 
 
 @pytest.fixture
-def storage(tmp_path: Path) -> Storage:
+def storage(tmp_path):
     return Storage(tmp_path)
 
 
@@ -42,7 +42,7 @@ def write(storage: Storage, *found: VariantResult) -> None:
     writer.flush(now=True)
 
 
-def test_results_come_back_in_the_order_of_variants(storage: Storage) -> None:
+def test_results_come_back_in_the_order_of_variants(storage):
     write(storage, result(7), result(2, "failed"))
     frame = read_results(storage)
     assert [2, 7] == frame["variant"].to_list()
@@ -50,7 +50,7 @@ def test_results_come_back_in_the_order_of_variants(storage: Storage) -> None:
     assert [(0.25, 1.0, None)] * 2 == frame.select("a", "wall_s", "setup_s").rows()
 
 
-def test_the_newest_result_of_a_variant_counts(storage: Storage) -> None:
+def test_the_newest_result_of_a_variant_counts(storage):
     write(storage, result(1, "failed"), result(2))
     write(storage, result(1))
     assert [(2, "complete"), (1, "complete")] == read_results(storage).select(
@@ -58,20 +58,18 @@ def test_the_newest_result_of_a_variant_counts(storage: Storage) -> None:
     ).rows()
 
 
-def test_numbers_that_are_not_finite_or_of_other_variants_are_missing(storage: Storage) -> None:
+def test_numbers_that_are_not_finite_or_of_other_variants_are_missing(storage):
     write(storage, result(1, a=float("nan")), result(2, b=float("inf")), result(3, b=1))
     assert [(None, None), (None, None), (None, 1.0)] == read_results(storage).select(
         "a", "b"
     ).rows()
 
 
-def test_a_study_without_results_has_their_columns(storage: Storage) -> None:
+def test_a_study_without_results_has_their_columns(storage):
     assert results.RESULT_COLUMNS == tuple(read_results(storage).columns)
 
 
-def test_tables_have_the_rows_of_all_variants_sorted_and_the_columns_of_any(
-    storage: Storage,
-) -> None:
+def test_tables_have_the_rows_of_all_variants_sorted_and_the_columns_of_any(storage):
     words = pa.array(["x"]).dictionary_encode()
     write(storage, result(4, rows={"step": [1], "word": words}), result(3, rows={"step": [0.5]}))
     file = table_files(storage, FILE)["rows"]
@@ -79,9 +77,7 @@ def test_tables_have_the_rows_of_all_variants_sorted_and_the_columns_of_any(
     assert expected == pq.read_table(storage.path(file)).to_pydict()
 
 
-def test_a_part_that_grows_is_written_again_with_all_of_its_rows(
-    storage: Storage, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_part_that_grows_is_written_again_with_all_of_its_rows(storage, monkeypatch):
     writer = ResultWriter(storage)
     for number in range(3):
         writer.add(result(number))
@@ -91,9 +87,7 @@ def test_a_part_that_grows_is_written_again_with_all_of_its_rows(
     assert 3 == len(read_results(storage))
 
 
-def test_what_comes_soon_after_is_written_later(
-    storage: Storage, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_comes_soon_after_is_written_later(storage, monkeypatch):
     now_s = 100.0
     monkeypatch.setattr(results.time, "monotonic", lambda: now_s)
     writer = ResultWriter(storage)
@@ -105,7 +99,7 @@ def test_what_comes_soon_after_is_written_later(
 
 
 @pytest.mark.parametrize("place", [40, -300])
-def test_a_flipped_bit_is_noted_and_its_part_deleted(storage: Storage, place: int) -> None:
+def test_a_flipped_bit_is_noted_and_its_part_deleted(storage, place):
     write(storage, result(1))
     write(storage, result(2))
     path = Path(storage.path(FILE))
@@ -118,7 +112,7 @@ def test_a_flipped_bit_is_noted_and_its_part_deleted(storage: Storage, place: in
     assert ["tables/rows/000002-0001.parquet"] == storage.names("tables/rows")
 
 
-def test_files_of_others_stay(storage: Storage) -> None:
+def test_files_of_others_stay(storage):
     write(storage, result(1))
     storage.write("tables/rows/mine.parquet", b"mine")
     storage.write("results/notes.txt", b"mine")
@@ -128,9 +122,7 @@ def test_files_of_others_stay(storage: Storage) -> None:
 
 
 @pytest.mark.parametrize("name", ["../precious.parquet", "tables/rows/000002-0001.parquet"])
-def test_results_that_name_files_of_others_delete_nothing(
-    storage: Storage, tmp_path: Path, name: str
-) -> None:
+def test_results_that_name_files_of_others_delete_nothing(storage, tmp_path, name):
     write(storage, result(1))
     rows = pq.read_table(storage.path(FILE))
     rows = rows.replace_schema_metadata({results._FILES: f'{{"rows": "{name}"}}'})
@@ -139,7 +131,7 @@ def test_results_that_name_files_of_others_delete_nothing(
     assert "is damaged" in problem
 
 
-def test_polars_and_others_read_the_folder(storage: Storage, tmp_path: Path) -> None:
+def test_polars_and_others_read_the_folder(storage, tmp_path):
     write(storage, result(1))
     write(storage, result(2))
     assert 2 == len(pl.read_parquet(tmp_path / "results/*.parquet"))

@@ -1,7 +1,6 @@
 """Rollouts: stages, guards, and intervals that hold on all days however often one looks."""
 
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.studies.design import build_design
 from fleet2d.studies.driver import check_study
 from fleet2d.studies.intervals import two_sample_interval
-from fleet2d.studies.reader import Study
 from fleet2d.studies.report import write_report
 from fleet2d.studies.rollout import RolloutAnswer, looks_of
 from fleet2d.studies.sentences import number
@@ -35,12 +33,12 @@ def rollout(count: int = 6, days: int = 4, **keys: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Study:
+def small(tmp_path_factory):
     guards = {"sightings.ana": {"least": -0.5}}
     return run(rollout(guards=guards), tmp_path_factory.mktemp("rollout") / "study")[1]
 
 
-def test_robots_do_the_same_until_their_stage_and_something_else_then(small: Study) -> None:
+def test_robots_do_the_same_until_their_stage_and_something_else_then(small):
     rows = small.polars("daily").filter(metric="distance.astro").collect()
     stages = dict(small.variants.select("robot", "stage").iter_rows())
     changed = 0
@@ -56,7 +54,7 @@ def test_robots_do_the_same_until_their_stage_and_something_else_then(small: Stu
     assert {"2026-01-06", "2026-01-07"} == {*stages.values()}
 
 
-def test_the_answer_tells_stages_guards_and_the_truth(small: Study) -> None:
+def test_the_answer_tells_stages_guards_and_the_truth(small):
     text = str(small.answer)
     assert "The change reaches" in text
     assert "of 6 robots" in text
@@ -67,7 +65,7 @@ def test_the_answer_tells_stages_guards_and_the_truth(small: Study) -> None:
     assert {"number", "truth", "mean without it"} <= {*found.table.columns}
 
 
-def test_a_stop_is_told_beside_what_would_have_been(small: Study) -> None:
+def test_a_stop_is_told_beside_what_would_have_been(small):
     found = RolloutAnswer(small)
     guards = {"distance.astro": Bounds(most=5)}
     found.settings = found.settings.model_copy(update={"guards": guards})
@@ -83,7 +81,7 @@ def test_a_stop_is_told_beside_what_would_have_been(small: Study) -> None:
     assert (size, side, "2026-01-08") == gone_on
 
 
-def test_where_all_robots_have_the_change_none_are_compared(small: Study) -> None:
+def test_where_all_robots_have_the_change_none_are_compared(small):
     found = RolloutAnswer(small)
     found._begins = np.full(6, 1)
     found.days = [1]
@@ -92,13 +90,13 @@ def test_where_all_robots_have_the_change_none_are_compared(small: Study) -> Non
     )
 
 
-def test_the_report_has_one_figure_of_the_rollout(small: Study, tmp_path: Path) -> None:
+def test_the_report_has_one_figure_of_the_rollout(small, tmp_path):
     page = write_report(small, tmp_path)
     assert "day by day" in page.read_text(encoding="utf-8")
     assert (tmp_path / "figures" / "rollout.svg").is_file()
 
 
-def test_numbers_of_each_day_end_as_the_run_ends_and_change_nothing() -> None:
+def test_numbers_of_each_day_end_as_the_run_ends_and_change_nothing():
     scenario = build_design(read_specification(rollout(1))).scenario(0)
     plain = execute(scenario, ("*",), ())
     daily = execute(scenario, ("*",), (), ("distance.astro",))
@@ -116,7 +114,7 @@ def world(robots: int, effect: float) -> tuple[Any, Any, Any]:
     return without, without + effect * (np.arange(8) >= begins[:, None]), begins
 
 
-def test_a_guard_stops_on_the_first_day_that_is_clear_and_none_that_is_not() -> None:
+def test_a_guard_stops_on_the_first_day_that_is_clear_and_none_that_is_not():
     harm = looks_of(*world(200, 2.0), 0.999, range(3, 8))
     none = looks_of(*world(200, 0.0), 0.999, range(3, 8))
     few = looks_of(*world(40, 2.0), 0.999, range(3, 8))
@@ -129,7 +127,7 @@ def test_a_guard_stops_on_the_first_day_that_is_clear_and_none_that_is_not() -> 
     assert harm[-1].low < 2.0 < harm[-1].high
 
 
-def test_a_constant_or_missing_metric_has_no_interval() -> None:
+def test_a_constant_or_missing_metric_has_no_interval():
     without = np.ones((80, 3))
     begins = np.where(np.arange(80) % 2, 1, 1 << 40)
     (look,) = looks_of(without, without, begins, 0.99, [2])
@@ -152,18 +150,18 @@ def test_a_constant_or_missing_metric_has_no_interval() -> None:
         ({"change": []}, "change"),
     ],
 )
-def test_mistakes_are_told_before_the_first_run(keys: dict[str, Any], words: str) -> None:
+def test_mistakes_are_told_before_the_first_run(keys, words):
     with pytest.raises(Fleet2DError, match=words):
         check_study(rollout(1, **keys))
 
 
-def test_a_rollout_needs_a_fleet() -> None:
+def test_a_rollout_needs_a_fleet():
     settings = {"change": SLOWER, "stages": STAGES, "watch": ["distance.astro"]}
     with pytest.raises(InputError, match="needs a fleet"):
         read_specification({"rollout": settings})
 
 
-def test_a_stage_that_reaches_few_leaves_out_the_runs_of_all_others() -> None:
+def test_a_stage_that_reaches_few_leaves_out_the_runs_of_all_others():
     design = build_design(read_specification(rollout(40, stages={"2026-01-06": 0.2})))
     rows = [design.parameters(i) for i in range(len(design))]
     treated = [row for row in rows if row["rollout"] == "with"]
@@ -172,13 +170,13 @@ def test_a_stage_that_reaches_few_leaves_out_the_runs_of_all_others() -> None:
     assert {"2026-01-06"} == {row["stage"] for row in treated}
 
 
-def test_a_robot_joins_at_the_same_stage_in_a_larger_fleet() -> None:
+def test_a_robot_joins_at_the_same_stage_in_a_larger_fleet():
     settings = Rollout(change=[SLOWER], stages=STAGES, watch=["distance.astro"])
     assert "2026-01-06" == settings.stage_of(0.29)
     assert "2026-01-07" == settings.stage_of(0.3)
 
 
-def test_intervals_of_two_samples_are_wider_on_the_skewed_side() -> None:
+def test_intervals_of_two_samples_are_wider_on_the_skewed_side():
     generator = np.random.default_rng(0)
     first, second = generator.lognormal(0, 1, 60), generator.normal(0, 1, 60)
     low, high = two_sample_interval(first, second)
@@ -188,6 +186,6 @@ def test_intervals_of_two_samples_are_wider_on_the_skewed_side() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", ["lognormal", "one in ten is eight times the others"])
-def test_intervals_hold_on_all_days_together(shape: str) -> None:
+def test_intervals_hold_on_all_days_together(shape):
     held = [simulated(shape, 400, seed, sums=True)[0] for seed in range(100)]
     assert sum(held) >= 90  # 95 expected; fewer than 90 has a probability of 1 %

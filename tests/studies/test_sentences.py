@@ -4,7 +4,6 @@ import json
 import math
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -156,7 +155,7 @@ ODD: dict[str, tuple[MadeUp, str]] = {
 
 
 @pytest.mark.parametrize("case", ODD)
-def test_an_odd_case_ends_in_true_sentences(case: str) -> None:
+def test_an_odd_case_ends_in_true_sentences(case):
     study, expected = ODD[case]
     answer = study.answer
     text = " ".join(answer.sentences)
@@ -175,7 +174,7 @@ def test_an_odd_case_ends_in_true_sentences(case: str) -> None:
             assert c.is_clear == (low >= 0 or high <= 0)
 
 
-def test_a_study_that_names_no_comparison_compares_what_can_be_judged(tmp_path: Path) -> None:
+def test_a_study_that_names_no_comparison_compares_what_can_be_judged(tmp_path):
     _, study = run(small(), tmp_path / "speeds")
     assert {f"{SPEED} = 0.6 against 0.3"} == {row["compared"] for row in study.answer.table}
     assert all("sightings" in row["number"] for row in study.answer.table)
@@ -184,7 +183,7 @@ def test_a_study_that_names_no_comparison_compares_what_can_be_judged(tmp_path: 
     assert "sightings" in " ".join(row["number"] for row in alone.answer.table)
 
 
-def test_a_value_that_failed_everywhere_is_named_without_being_asked_for(tmp_path: Path) -> None:
+def test_a_value_that_failed_everywhere_is_named_without_being_asked_for(tmp_path):
     (tmp_path / "mine.py").write_text(
         "from fleet2d import Algorithm\n"
         "class Fails(Algorithm):\n"
@@ -199,7 +198,7 @@ def test_a_value_that_failed_everywhere_is_named_without_being_asked_for(tmp_pat
     assert "There is nothing to compare" not in text
 
 
-def test_a_study_that_goes_on_with_another_fleet_answers_for_that_one(tmp_path: Path) -> None:
+def test_a_study_that_goes_on_with_another_fleet_answers_for_that_one(tmp_path):
     def fleet(*radii: float) -> dict[str, Any]:
         options = {f"home {r}": {"users.ana.radius": r} for r in radii}
         axes = {SPEED: [0.3, 0.6], HOME: {"options": options, "population": True}}
@@ -237,7 +236,7 @@ def claim_of(study: MadeUp) -> tuple[str, float]:
 
 @pytest.mark.parametrize("homes", [10, 30, 40])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_statistician_says_the_same_of_the_same_table(shape: str, homes: int) -> None:
+def test_a_statistician_says_the_same_of_the_same_table(shape, homes):
     study = drawn(shape, homes, effect={10: 1.5, 30: 0.7, 40: 0.0}[homes])
     (comparison,) = StudyAnswer(study).comparisons
     claim, p = claim_of(study)
@@ -247,14 +246,14 @@ def test_a_statistician_says_the_same_of_the_same_table(shape: str, homes: int) 
     assert ("which is better" in text) == (comparison.outcome == "better")
 
 
-def test_a_long_table_says_how_many_rows_are_left_out() -> None:
+def test_a_long_table_says_how_many_rows_are_left_out():
     rows = tuple({"number": f"m{n}", "mean": 0.5} for n in range(14))
     assert str(Conclusion("", ("Done.",), rows)).endswith("m11     0.5\n… and 2 more rows")
     assert "<p>… and 2 more rows</p>" in Conclusion("", ("Done.",), rows)._repr_html_()
     assert "more row" not in str(Conclusion("", ("Done.",), rows[:12]))
 
 
-def test_p_values_of_several_methods_are_those_of_holm() -> None:
+def test_p_values_of_several_methods_are_those_of_holm():
     study = of_homes(old=[0.0] * 30, a=NOISE + 2, b=NOISE + 0.5, c=NOISE + 0.4)
     found = StudyAnswer(study).comparisons
     alone = [stats.ttest_1samp(NOISE + effect, 0).pvalue for effect in (2, 0.5, 0.4)]

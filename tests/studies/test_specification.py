@@ -1,7 +1,6 @@
 """Study files: what is read from them, and how wrong ones are refused, with file and line."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.studies.scenes import SPEED, base
@@ -17,16 +16,16 @@ def read_text(text: str, folder: Path) -> Specification:
     return read_specification(file)
 
 
-def test_a_file_is_called_by_its_name(tmp_path: Path) -> None:
+def test_a_file_is_called_by_its_name(tmp_path):
     assert "study" == read_text("replicates: 2\n", tmp_path).name
     assert "speeds" == read_text("name: speeds\n", tmp_path).name
 
 
-def test_the_bundled_scenario_is_the_base_of_those_without(tmp_path: Path) -> None:
+def test_the_bundled_scenario_is_the_base_of_those_without(tmp_path):
     assert "bundled" == read_text("replicates: 2\n", tmp_path).base.data["floorplan"]["type"]
 
 
-def test_a_base_is_found_beside_the_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_base_is_found_beside_the_study(tmp_path, monkeypatch):
     (tmp_path / "home.yaml").write_text("extends: bundled:paper\nsimulation: {duration: 3 h}\n")
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
@@ -36,18 +35,18 @@ def test_a_base_is_found_beside_the_study(tmp_path: Path, monkeypatch: pytest.Mo
     assert ("3 h", "2 s") == (simulation["duration"], simulation["step"])
 
 
-def test_a_base_can_be_a_scenario_in_python() -> None:
+def test_a_base_can_be_a_scenario_in_python():
     scenario = load_scenario(base())
     specification = load_scenario(read_specification({"base": scenario}).base.data)
     assert scenario.resolved() == specification.resolved()
 
 
-def test_a_bare_list_is_an_axis_called_by_its_key(tmp_path: Path) -> None:
+def test_a_bare_list_is_an_axis_called_by_its_key(tmp_path):
     specification = read_text(f"axes: {{{SPEED}: [0.3, 0.6]}}\n", tmp_path)
     assert [SPEED] == list(specification.file.axes)
 
 
-def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
+def test_populations_are_homes_people_and_seeds(tmp_path):
     text = "axes:\n  home: {synthetic: 3}\n  speed: {key: robots.astro.speed, values: [1]}\n"
     assert ("home", "seed") == read_text(text, tmp_path).file.populations
 
@@ -80,7 +79,7 @@ def test_populations_are_homes_people_and_seeds(tmp_path: Path) -> None:
         ("axes: {a: {key: a.b, values: [1], when: {b: 1}}}\n", r"no axis 'b'. The axes before it"),
     ],
 )
-def test_wrong_files_are_refused_with_their_line(tmp_path: Path, text: str, message: str) -> None:
+def test_wrong_files_are_refused_with_their_line(tmp_path, text, message):
     with pytest.raises(ScenarioError, match=message):
         read_text(text, tmp_path)
 
@@ -92,8 +91,6 @@ def test_wrong_files_are_refused_with_their_line(tmp_path: Path, text: str, mess
         ({"axes": {"home": {"synthetic": 10**9}}}, "FLEET2D_MAX_VARIANTS"),
     ],
 )  # fmt: skip
-def test_axes_of_more_values_than_fit_into_memory_are_refused(
-    study: dict[str, Any], message: str
-) -> None:
+def test_axes_of_more_values_than_fit_into_memory_are_refused(study, message):
     with pytest.raises(ScenarioError, match=message):
         read_specification(study)

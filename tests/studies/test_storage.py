@@ -2,7 +2,6 @@
 
 import shutil
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import polars as pl
@@ -20,7 +19,7 @@ ROWS = small(keep={"tables": ["room_share"]})
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[str]:
+def server():
     """An S3 server on this machine: its address."""
     moto = optional("moto.server")
     running = moto.ThreadedMotoServer(port=0, verbose=False)
@@ -31,7 +30,7 @@ def server() -> Iterator[str]:
 
 
 @pytest.fixture
-def location(server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def location(server, tmp_path, monkeypatch):
     """Where a study lies on that server; the cache of this machine is empty."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     bucket = f"bucket-{abs(hash(tmp_path)) % 10**9}"
@@ -43,7 +42,7 @@ def location(server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> st
     return f"s3://key:secret@{bucket}/studies/speed?{options}"
 
 
-def test_a_study_on_s3_is_the_same_as_in_a_folder(location: str, tmp_path: Path) -> None:
+def test_a_study_on_s3_is_the_same_as_in_a_folder(location, tmp_path):
     _, local = run(ROWS, tmp_path / "study")
     counts, remote = run(ROWS, location)  # type: ignore[arg-type]
     assert 6 == counts.complete
@@ -54,7 +53,7 @@ def test_a_study_on_s3_is_the_same_as_in_a_folder(location: str, tmp_path: Path)
     assert digests(local)[3] == remote.rerun(3).digest
 
 
-def test_a_study_on_s3_goes_on_where_it_was_interrupted(location: str, tmp_path: Path) -> None:
+def test_a_study_on_s3_goes_on_where_it_was_interrupted(location, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
     assert 2 == open_study(location).counts.complete
@@ -63,32 +62,32 @@ def test_a_study_on_s3_goes_on_where_it_was_interrupted(location: str, tmp_path:
     assert digests(local) == digests(remote)
 
 
-def test_what_is_on_s3_is_there_for_another_machine(location: str, tmp_path: Path) -> None:
+def test_what_is_on_s3_is_there_for_another_machine(location, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
     shutil.rmtree(tmp_path / "cache")
     assert 2 == open_study(location).counts.complete
 
 
-def test_a_part_that_is_cut_on_s3_is_run_again(location: str) -> None:
+def test_a_part_that_is_cut_on_s3_is_run_again(location):
     run(ROWS, location)  # type: ignore[arg-type]
     Storage(location).write("results/000001.parquet", b"PAR1")
     counts, _ = run(ROWS, location)  # type: ignore[arg-type]
     assert 6 == counts.complete
 
 
-def test_a_location_that_is_none_is_refused() -> None:
+def test_a_location_that_is_none_is_refused():
     with pytest.raises(RunDirectoryError, match="can't be used as a store"):
         Storage("nowhere://bucket/study")
 
 
-def test_secrets_in_a_location_are_not_printed() -> None:
+def test_secrets_in_a_location_are_not_printed():
     storage = Storage("s3://key:secret@bucket/study?region=us-east-1")
     assert "s3://bucket/study?region=us-east-1" == storage.location
 
 
 @pytest.mark.slow
-def test_a_server_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_that_does_not_answer_is_told(monkeypatch):
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
     gone = "s3://key:secret@bucket/study?endpoint_override=127.0.0.1:9&scheme=http&region=a"
     options: Any = "&request_timeout=1&connect_timeout=1"
@@ -100,7 +99,7 @@ def test_a_server_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) 
         directory.exists()
 
 
-def test_a_file_location_is_a_folder_like_others(tmp_path: Path) -> None:
+def test_a_file_location_is_a_folder_like_others(tmp_path):
     storage = Storage((tmp_path / "new" / "study").as_uri())
     storage.write("results/a.txt", b"a")
     assert storage.folder is not None
@@ -108,7 +107,7 @@ def test_a_file_location_is_a_folder_like_others(tmp_path: Path) -> None:
     assert str(tmp_path / "new" / "study") == storage.location
 
 
-def test_files_are_whole_or_not_there(tmp_path: Path) -> None:
+def test_files_are_whole_or_not_there(tmp_path):
     storage = Storage(tmp_path)
     storage.write("a/b.txt", b"whole")
     assert (["a/b.txt"], 5, b"whole") == (
@@ -119,7 +118,7 @@ def test_files_are_whole_or_not_there(tmp_path: Path) -> None:
     assert (None, []) == (storage.size("a/b.txt"), storage.names("a"))
 
 
-def test_a_table_that_ends_in_an_error_leaves_the_file_before(tmp_path: Path) -> None:
+def test_a_table_that_ends_in_an_error_leaves_the_file_before(tmp_path):
     storage = Storage(tmp_path)
     table = pl.DataFrame({"variant": [1, 2]}).to_arrow()
     storage.write_table("plan.parquet", [table])

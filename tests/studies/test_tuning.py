@@ -64,7 +64,7 @@ def tuned_study(
         return tune(study, folder, crew, **options)
 
 
-def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> None:
+def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path):
     result = tuned(tmp_path)
     assert 0.2 <= result.settings[SPEED] <= 1.0
     (row,) = result.held_out.paired("distance.astro", {"setting": "base"}).to_dicts()
@@ -72,14 +72,14 @@ def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path: Path) -> Non
     assert {0.15} == set(result.held_out.variants["radius"])
 
 
-def test_it_runs_on_training_homes_only(tmp_path: Path) -> None:
+def test_it_runs_on_training_homes_only(tmp_path):
     spy = Spy()
     tuned(tmp_path, spy)
     assert {0, 1} == {task.index for task in spy.trials}
     assert 6 == len({task.trial for task in spy.trials})
 
 
-def test_it_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
+def test_it_goes_on_where_it_was_interrupted(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         tuned(tmp_path, Spy(5))
     spy = Spy()
@@ -92,7 +92,7 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_it_runs_in_worker_processes(tmp_path: Path) -> None:
+def test_it_runs_in_worker_processes(tmp_path):
     assert 3 == tuned(tmp_path, LocalExecutor(1), trials=3).trials["complete"]
 
 
@@ -108,7 +108,7 @@ def parameters(tmp_path: Path) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.slow
-def test_trials_are_the_same_with_any_number_of_workers(tmp_path: Path) -> None:
+def test_trials_are_the_same_with_any_number_of_workers(tmp_path):
     """Each worker that became free asked for a trial, so that their number decided on it."""
     keys = {"trials": 6, "batch": 3}
     tuned(tmp_path / "one", SerialExecutor(), **keys)
@@ -133,7 +133,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("change", some([*CHANGES], 3))
-def test_another_search_never_gets_the_trials_of_this_one(tmp_path: Path, change: str) -> None:
+def test_another_search_never_gets_the_trials_of_this_one(tmp_path, change):
     """Trials on a home that was held out afterwards counted, and were reported for homes unseen.
 
     So did values of another objective. Now such a folder is refused; redone, it starts anew.
@@ -157,7 +157,7 @@ def test_another_search_never_gets_the_trials_of_this_one(tmp_path: Path, change
     assert [] == again.trials
 
 
-def test_more_trials_continue_a_search_and_judge_the_new_best(tmp_path: Path) -> None:
+def test_more_trials_continue_a_search_and_judge_the_new_best(tmp_path):
     """If more trials found better settings, their study was refused as one of other scenarios."""
     tuned(tmp_path, trials=1)
     spy = Spy()
@@ -166,7 +166,7 @@ def test_more_trials_continue_a_search_and_judge_the_new_best(tmp_path: Path) ->
     assert (8, 4) == (result.trials["complete"], result.held_out.counts.complete)
 
 
-def test_trials_of_unknown_origin_are_refused(tmp_path: Path) -> None:
+def test_trials_of_unknown_origin_are_refused(tmp_path):
     """Earlier versions stored trials without what they are of."""
     tuned(tmp_path, trials=1)
     (tmp_path / "tune" / "search.json").unlink()
@@ -174,7 +174,7 @@ def test_trials_of_unknown_origin_are_refused(tmp_path: Path) -> None:
         tuned(tmp_path, trials=1)
 
 
-def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path: Path) -> None:
+def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path):
     """Variants without the axis were trained on, and were shown as held out."""
     study = search(held_out={"dwell": ["2 s"]})
     study["axes"]["dwell"] = {
@@ -184,7 +184,7 @@ def test_an_axis_that_applies_to_some_variants_only_is_not_held_out(tmp_path: Pa
         tuned_study(study, tmp_path / "tune")
 
 
-def test_the_sampler_can_be_chosen(tmp_path: Path) -> None:
+def test_the_sampler_can_be_chosen(tmp_path):
     (tmp_path / "mine.py").write_text(
         "import optuna\n"
         "class Middle(optuna.samplers.BaseSampler):\n"
@@ -212,17 +212,17 @@ def test_the_sampler_can_be_chosen(tmp_path: Path) -> None:
         ({"objective": {"a": "minimize", "b": "minimize"}}, "length 1 or less"),
     ],
 )
-def test_wrong_searches_are_refused(tmp_path: Path, keys: dict[str, Any], message: str) -> None:
+def test_wrong_searches_are_refused(tmp_path, keys, message):
     with pytest.raises(ScenarioError, match=message):
         tuned(tmp_path, **keys)
 
 
-def test_a_study_without_a_search_is_refused(tmp_path: Path) -> None:
+def test_a_study_without_a_search_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match="has no section `tune`"):
         tuned_study(small(), tmp_path)
 
 
-def test_an_objective_that_no_variant_can_have_is_refused(tmp_path: Path) -> None:
+def test_an_objective_that_no_variant_can_have_is_refused(tmp_path):
     """It showed only when all trials had failed."""
     with pytest.raises(
         ScenarioError, match=r"tune\.objective\.happiness: no variant has .*'happiness'"
@@ -231,12 +231,12 @@ def test_an_objective_that_no_variant_can_have_is_refused(tmp_path: Path) -> Non
     assert not (tmp_path / "tune").exists()
 
 
-def test_an_objective_that_no_run_has_is_named(tmp_path: Path) -> None:
+def test_an_objective_that_no_run_has_is_named(tmp_path):
     with pytest.raises(InputError, match=r"no trial succeeded.*no metric 'distance.happiness'"):
         tuned(tmp_path, objective={"distance.happiness": "maximize"}, trials=1)
 
 
-def test_a_copy_of_a_home_is_not_held_out_of_a_search_on_the_home(tmp_path: Path) -> None:
+def test_a_copy_of_a_home_is_not_held_out_of_a_search_on_the_home(tmp_path):
     home = Path(__file__).parents[2] / "examples" / "small_flat.json"
     paths = [tmp_path / name for name in ("first.json", "second.json", "third.json")]
     for path in paths[:2]:

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-from tests.scenes import Cli
 from tests.testing.test_gate import TEST, gate, reports
 
 from fleet2d.testing.answer import answer, headline
@@ -11,7 +10,7 @@ from fleet2d.testing.gate import Gate, compare, tally
 from fleet2d.testing.suite import TrialReport
 
 
-def test_what_holds_by_less_is_told_although_no_verdict_differs() -> None:
+def test_what_holds_by_less_is_told_although_no_verdict_differs():
     found = gate(set(), set(), margin=0.75)
 
     assert found.passes
@@ -31,29 +30,27 @@ def test_what_holds_by_less_is_told_although_no_verdict_differs() -> None:
     ],
     ids=["all held", "one failed", "failed before, too", "only now", "more often"],
 )
-def test_what_speaks_against_a_release(
-    new: set[int], old: set[int] | None, passes: bool, words: str
-) -> None:
+def test_what_speaks_against_a_release(new, old, passes, words):
     found = gate(new, old)
 
     assert passes == found.passes
     assert words in headline(found)
 
 
-def test_equal_builds_say_what_may_have_gone_unseen() -> None:
+def test_equal_builds_say_what_may_have_gone_unseen():
     assert "All 20 verdicts are those of 2.0; what differs in less than 13.9 % of trials may" in (
         str(answer(gate(set(), set())))
     )
 
 
-def test_builds_between_which_nothing_differs_at_all_are_asked_about() -> None:
+def test_builds_between_which_nothing_differs_at_all_are_asked_about():
     asked = "nothing holds by more or less: do both builds differ in what these tests use?"
 
     assert asked in str(answer(gate(set(), set())))
     assert asked not in str(answer(gate(set(), set(), margin=0.75)))
 
 
-def test_a_difference_that_may_be_chance_says_how_many_trials_would_show_it() -> None:
+def test_a_difference_that_may_be_chance_says_how_many_trials_would_show_it():
     # 3 of 20 are worse: 2 / 2**3 is .25, and 2 / 2**6 is below .05.
     says = " ".join(answer(gate({1, 2, 3}, set())).sentences)
 
@@ -62,14 +59,14 @@ def test_a_difference_that_may_be_chance_says_how_many_trials_would_show_it() ->
     assert "times as many" not in str(answer(gate(set(range(9)), set())))
 
 
-def test_a_build_without_common_trials_is_not_compared() -> None:
+def test_a_build_without_common_trials_is_not_compared():
     tallies = tally([TEST], reports(set()))
     found = Gate("2.1", tallies, "2.0", [], compare(tallies, []))
 
     assert "No trial of 2.0 is the same: nothing is compared." in answer(found).sentences
 
 
-def test_a_build_that_does_not_run_is_said_and_does_not_pass() -> None:
+def test_a_build_that_does_not_run_is_said_and_does_not_pass():
     broken = [TrialReport(r.key, error="robots.astro.speeed: unknown key") for r in reports(set())]
     tallies = tally([TEST], broken)
     found = Gate("2.1", tallies, "2.0", tally([TEST], reports(set())))
@@ -82,9 +79,7 @@ def test_a_build_that_does_not_run_is_said_and_does_not_pass() -> None:
     )
 
 
-def test_a_test_without_trials_is_not_run_and_what_it_covers_is_not_uncovered(
-    fleet2d: Cli,
-) -> None:
+def test_a_test_without_trials_is_not_run_and_what_it_covers_is_not_uncovered(fleet2d):
     head = "simulation: {start: 2026-01-05, duration: 2 min, seed: 1}\nfloorplan: bundled\n"
     robots = "robots: {astro: {type: patrol, dwell: 10 s}}\n"
     for name in ("a", "b"):

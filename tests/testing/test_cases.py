@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 import yaml
-from tests.scenes import Cli, scenario
+from tests.scenes import scenario
 
 
 def written(name: str = "home.yaml", **expect: Any) -> Path:
@@ -27,7 +27,7 @@ HOLDS = "always(distance(ana, astro) > 0)"
 FAILS = "never(moving(astro))"
 
 
-def test_what_holds_exits_with_0(fleet2d: Cli) -> None:
+def test_what_holds_exits_with_0(fleet2d):
     code, out, _ = fleet2d("test", written(apart=HOLDS), "--seeds", "3")
 
     assert code == 0
@@ -37,7 +37,7 @@ def test_what_holds_exits_with_0(fleet2d: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_what_fails_is_told_kept_and_drawn(fleet2d: Cli) -> None:
+def test_what_fails_is_told_kept_and_drawn(fleet2d):
     code, out, _ = fleet2d(
         "test", written(apart=HOLDS, still=FAILS), "--seeds", "2", "--junit", "out/results.xml",
         "--out", "kept",
@@ -57,7 +57,7 @@ def test_what_fails_is_told_kept_and_drawn(fleet2d: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_the_command_that_is_printed_shows_the_moment_again(fleet2d: Cli) -> None:
+def test_the_command_that_is_printed_shows_the_moment_again(fleet2d):
     _, out, _ = fleet2d("test", written(still=FAILS), "simulation.duration=2 min")
     line = next(line for line in out.splitlines() if "see it" in line)
     run, show = line.partition(": ")[2].split("; ")
@@ -66,7 +66,7 @@ def test_the_command_that_is_printed_shows_the_moment_again(fleet2d: Cli) -> Non
     assert fleet2d(*shlex.split(show)[1:])[0] == 0
 
 
-def test_json_has_every_verdict(fleet2d: Cli) -> None:
+def test_json_has_every_verdict(fleet2d):
     code, out, _ = fleet2d("test", written(apart=HOLDS, still=FAILS), "--json", "--seed", "9")
     gate = json.loads(out)
     (case,) = gate["trials"]
@@ -77,7 +77,7 @@ def test_json_has_every_verdict(fleet2d: Cli) -> None:
     assert case["expectations"]["still"]["robustness"] is None
 
 
-def test_a_run_that_breaks_is_an_error_and_not_a_crash(fleet2d: Cli) -> None:
+def test_a_run_that_breaks_is_an_error_and_not_a_crash(fleet2d):
     path = written(apart=HOLDS, missing="at_end(metric(distance.nobody) > 0)")
     code, out, _ = fleet2d("test", path, "metrics.distance={}", "--junit", "results.xml")
 
@@ -87,14 +87,14 @@ def test_a_run_that_breaks_is_an_error_and_not_a_crash(fleet2d: Cli) -> None:
     assert suite.get("errors") == "1"
 
 
-def test_a_scenario_that_expects_nothing_is_refused(fleet2d: Cli) -> None:
+def test_a_scenario_that_expects_nothing_is_refused(fleet2d):
     code, out, err = fleet2d("test", written(), written("other.yaml", apart=HOLDS))
 
     assert (code, out) == (2, "")
     assert "home.yaml has no expectations" in err
 
 
-def test_a_wrong_expectation_is_refused_before_anything_runs(fleet2d: Cli) -> None:
+def test_a_wrong_expectation_is_refused_before_anything_runs(fleet2d):
     wrong = written("wrong.yaml", apart="always(distance(an, astro) > 0)")
     code, out, err = fleet2d("test", written(apart=HOLDS), wrong)
 
@@ -103,7 +103,7 @@ def test_a_wrong_expectation_is_refused_before_anything_runs(fleet2d: Cli) -> No
     assert "did you mean 'ana'" in err
 
 
-def test_run_says_what_held_and_what_was_violated(fleet2d: Cli) -> None:
+def test_run_says_what_held_and_what_was_violated(fleet2d):
     path = written(apart=HOLDS, still=FAILS)
     code, out, _ = fleet2d("run", path, "--out", "run")
 
@@ -122,9 +122,7 @@ def test_run_says_what_held_and_what_was_violated(fleet2d: Cli) -> None:
     assert "run/picture.png" == out.strip()
 
 
-def test_run_that_did_as_expected_says_so_first_and_one_without_says_nothing(
-    fleet2d: Cli,
-) -> None:
+def test_run_that_did_as_expected_says_so_first_and_one_without_says_nothing(fleet2d):
     _, out, _ = fleet2d("run", written(apart=HOLDS), "--out", "run")
     assert "1 expectation: 1 held" == out.splitlines()[0]
     _, out, _ = fleet2d("run", written(), "--out", "none")
@@ -132,7 +130,7 @@ def test_run_that_did_as_expected_says_so_first_and_one_without_says_nothing(
     assert "verdict" not in json.loads(fleet2d("run", written(), "--out", "c", "--json")[1])
 
 
-def test_one_file_runs_over_a_folder_of_homes(fleet2d: Cli) -> None:
+def test_one_file_runs_over_a_folder_of_homes(fleet2d):
     path = written(apart=HOLDS, out="never(room(astro) == office)")
     plans = Path("plans")
     plans.mkdir()
@@ -152,7 +150,7 @@ def test_one_file_runs_over_a_folder_of_homes(fleet2d: Cli) -> None:
     assert 'note: room("astro"): this home has no office' in out
 
 
-def test_what_was_not_tested_is_shown_and_fails_unless_it_may(fleet2d: Cli) -> None:
+def test_what_was_not_tested_is_shown_and_fails_unless_it_may(fleet2d):
     waits = "after(events(called, astro), moving(astro), within=1 min)"
     code, out, _ = fleet2d("test", written(waits=waits, apart=HOLDS), "--junit", "results.xml")
 

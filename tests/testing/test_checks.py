@@ -94,7 +94,7 @@ class Meddler(Algorithm):
 
 
 @pytest.mark.slow
-def test_sound_algorithms_pass() -> None:
+def test_sound_algorithms_pass():
     check_algorithm(Sound, period="30 min")
     check_algorithm(OnSight)
 
@@ -110,7 +110,7 @@ def test_sound_algorithms_pass() -> None:
         (Meddler, "does not support item assignment"),
     ],
 )
-def test_each_broken_promise_is_named(cls: type[Algorithm], words: str) -> None:
+def test_each_broken_promise_is_named(cls, words):
     with pytest.raises(AssertionError, match=words):
         check_algorithm(cls)
 
@@ -139,7 +139,7 @@ class Undefined(PerceptionError):
         return sightings.replace(x=np.nan)
 
 
-def test_the_built_in_errors_pass() -> None:
+def test_the_built_in_errors_pass():
     check_perception_error(Outliers, share="10 %", lasts="5 s")
     check_perception_error(Miscalibration, yaw_deg=3)
 
@@ -152,6 +152,6 @@ def test_the_built_in_errors_pass() -> None:
         (Undefined, "errors.checked failed at step .*: x is nan"),
     ],
 )
-def test_each_problem_is_named(cls: type[PerceptionError], message: str) -> None:
+def test_each_problem_is_named(cls, message):
     with pytest.raises(AssertionError, match=message):
         check_perception_error(cls)

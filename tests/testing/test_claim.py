@@ -34,7 +34,7 @@ def decisions(test: RateTest, rate: float, seed: int) -> Bool:
 
 
 @pytest.mark.parametrize(("seeds", "holds"), CLAIMS)
-def test_error_rates_of_ten_thousand_decisions_are_as_stated(seeds: int, holds: float) -> None:
+def test_error_rates_of_ten_thousand_decisions_are_as_stated(seeds, holds):
     test = rate_test(seeds, holds)
     noise = 4 * np.sqrt(0.05 * 0.95 / DECISIONS)
     refusals_of_truth = 1 - decisions(test, holds, 1).mean()
@@ -55,7 +55,7 @@ def mean_seeds(test: RateTest, rate: float) -> float:
 
 @pytest.mark.parametrize("error", [0.01, 0.05, 0.2])
 @pytest.mark.parametrize(("seeds", "holds"), CLAIMS)
-def test_exact_error_rates_are_as_stated(seeds: int, holds: float, error: float) -> None:
+def test_exact_error_rates_are_as_stated(seeds, holds, error):
     test = rate_test(seeds, holds, error)
     assert 1 - test.acceptance(holds) <= error + 1e-12
     assert test.acceptance(test.alternative) <= error + 1e-12
@@ -63,7 +63,7 @@ def test_exact_error_rates_are_as_stated(seeds: int, holds: float, error: float)
 
 
 @pytest.mark.parametrize("rate", [0.95, 0.6])
-def test_acceptance_is_the_sum_over_all_outcomes(rate: float) -> None:
+def test_acceptance_is_the_sum_over_all_outcomes(rate):
     """The slow twin: every outcome of ten seeds, one after the other."""
     test = rate_test(10, 0.9, 0.2)
     accepted, looked = 0.0, 0.0
@@ -79,19 +79,19 @@ def test_acceptance_is_the_sum_over_all_outcomes(rate: float) -> None:
     assert looked == pytest.approx(mean_seeds(test, rate), abs=1e-9)
 
 
-def test_clear_rates_stop_early() -> None:
+def test_clear_rates_stop_early():
     test = rate_test(100, 0.95)
     assert mean_seeds(test, 0.5) < 15
     assert mean_seeds(test, 1.0) < 60
     assert test.decide(20, 12) is False
 
 
-def test_more_seeds_tell_nearer_rates() -> None:
+def test_more_seeds_tell_nearer_rates():
     rates = [rate_test(seeds, 0.95).alternative for seeds in (20, 50, 100, 300)]
     assert sorted(rates) == rates
 
 
-def test_a_claim_of_every_seed_ends_with_the_first_failure() -> None:
+def test_a_claim_of_every_seed_ends_with_the_first_failure():
     test = rate_test(100)
     assert test.decide(3, 1) is False
     assert test.decide(99, 0) is None
@@ -109,14 +109,14 @@ def test_a_claim_of_every_seed_ends_with_the_first_failure() -> None:
         ({"seeds": 1, "holds": 0.9}, "take 2 seeds or more"),
     ],
 )
-def test_wrong_numbers_are_refused(settings: dict[str, float], words: str) -> None:
+def test_wrong_numbers_are_refused(settings, words):
     with pytest.raises(InputError, match=words):
         rate_test(**settings)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.5, 0.8, 0.97])
-def test_the_interval_of_a_rate_holds_it_in_95_of_100_cases(rate: float) -> None:
+def test_the_interval_of_a_rate_holds_it_in_95_of_100_cases(rate):
     held = np.random.Generator(np.random.Philox(5)).binomial(40, rate, 2000)
     inside = [low <= rate <= high for low, high in (rate_interval(int(k), 40) for k in held)]
 
@@ -127,19 +127,19 @@ def test_the_interval_of_a_rate_holds_it_in_95_of_100_cases(rate: float) -> None
 
 
 @pytest.mark.parametrize("held", [0, 1, 19, 20])
-def test_the_interval_of_a_rate_is_within_0_and_1(held: int) -> None:
+def test_the_interval_of_a_rate_is_within_0_and_1(held):
     low, high = rate_interval(held, 20)
     assert 0 <= low <= held / 20 <= high <= 1
     assert 0 < high - low < 1
 
 
-def test_trials_that_share_no_home_are_independent() -> None:
+def test_trials_that_share_no_home_are_independent():
     outcomes = [True] * 9 + [False]
     assert rate_interval(9, 10) == nested_rate_interval([[held] for held in outcomes])
     assert rate_interval(9, 10) == nested_rate_interval([outcomes])  # seeds of one scenario
 
 
-def test_trials_that_share_homes_tell_less_the_more_homes_differ() -> None:
+def test_trials_that_share_homes_tell_less_the_more_homes_differ():
     alike = nested_rate_interval([[True] * 3 + [False]] * 5)
     different = nested_rate_interval([[True] * 4] * 3 + [[True] * 3 + [False]] + [[False] * 4])
     assert alike == rate_interval(15, 20)
@@ -149,7 +149,7 @@ def test_trials_that_share_homes_tell_less_the_more_homes_differ() -> None:
     assert rate_interval(0, 4) == nested_rate_interval([[False] * 10] * 4)
 
 
-def test_the_interval_of_a_rate_holds_it_where_homes_differ() -> None:
+def test_the_interval_of_a_rate_holds_it_where_homes_differ():
     generator = np.random.Generator(np.random.Philox(6))
     inside = alone = 0
     for _ in range(300):
@@ -164,7 +164,7 @@ def test_the_interval_of_a_rate_holds_it_where_homes_differ() -> None:
 
 
 @pytest.mark.parametrize(("holds", "other"), [(1.0, 0.9), (0.9, 0.7), (0.95, 0.8)])
-def test_so_many_seeds_would_do_and_one_less_would_not(holds: float, other: float) -> None:
+def test_so_many_seeds_would_do_and_one_less_would_not(holds, other):
     needed = seeds_for(holds, other)
 
     assert needed is not None
@@ -173,7 +173,7 @@ def test_so_many_seeds_would_do_and_one_less_would_not(holds: float, other: floa
 
 
 @pytest.mark.slow
-def test_a_claim_that_shows_nothing_is_refused_with_the_seeds_that_would_do() -> None:
+def test_a_claim_that_shows_nothing_is_refused_with_the_seeds_that_would_do():
     with pytest.raises(
         SetUpError,
         match=r"99 % can't be told from 90 % with 5 seeds, which show nothing.*; 63 would do",

@@ -1,7 +1,6 @@
 """Smaller versions of a failing run: each fails in the same way, for the same reason."""
 
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -45,7 +44,7 @@ def smaller(variant: Variant, body: Body = nothing, tries: int = 60) -> FailingC
     return case
 
 
-def test_it_keeps_the_violated_expectation_though_others_fail_in_less() -> None:
+def test_it_keeps_the_violated_expectation_though_others_fail_in_less():
     def body(trial: Trial) -> None:
         trial.expect("never(room(bolt) == kitchen)", name="kitchen")
         trial.expect("eventually(room(ana) == storage, within=19 min)", name="storage")
@@ -57,7 +56,7 @@ def test_it_keeps_the_violated_expectation_though_others_fail_in_less() -> None:
     assert ["ana"] == list(case.variant.scenario.users), "whom the other names"
 
 
-def test_it_keeps_the_interventions_that_a_missed_expectation_is_about() -> None:
+def test_it_keeps_the_interventions_that_a_missed_expectation_is_about():
     def body(trial: Trial) -> None:
         trial.do(Put("ben", "kitchen"))
         trial.do(ShutDoor("bath"))
@@ -74,7 +73,7 @@ def test_it_keeps_the_interventions_that_a_missed_expectation_is_about() -> None
     assert ["astro"] == list(case.variant.scenario.robots)
 
 
-def test_it_keeps_the_kind_of_violation() -> None:
+def test_it_keeps_the_kind_of_violation():
     def body(trial: Trial) -> None:
         trial.advance(600)
         if trial.state["bolt"]["room"] is not None:
@@ -86,7 +85,7 @@ def test_it_keeps_the_kind_of_violation() -> None:
     assert "one line" in str(case.result.error)
 
 
-def test_it_keeps_the_learning_that_the_failure_depends_on() -> None:
+def test_it_keeps_the_learning_that_the_failure_depends_on():
     learned = flat(
         "3 h",
         algorithms={"share": {"type": f"{OWN}:Share", "period": "10 min"}},
@@ -100,7 +99,7 @@ def test_it_keeps_the_learning_that_the_failure_depends_on() -> None:
     assert case.variant.scenario.algorithms
 
 
-def test_learning_that_the_failure_does_not_depend_on_goes() -> None:
+def test_learning_that_the_failure_does_not_depend_on_goes():
     other = flat(
         "3 h",
         algorithms={"share": {"type": f"{OWN}:Share", "period": "10 min"}},
@@ -113,7 +112,7 @@ def test_learning_that_the_failure_does_not_depend_on_goes() -> None:
 
 
 @pytest.mark.parametrize("moment", ["14:40", "15:17"])
-def test_it_begins_as_near_to_the_failure_as_it_can(moment: str) -> None:
+def test_it_begins_as_near_to_the_failure_as_it_can(moment):
     hour, minute = map(int, moment.split(":"))
     put = {"at": "14:21", "put": "bolt", "to": "kitchen"}
     hold = {"at": "14:21", "hold": "bolt"}
@@ -132,7 +131,7 @@ def test_it_begins_as_near_to_the_failure_as_it_can(moment: str) -> None:
     assert {} == case.variant.scenario.users
 
 
-def test_what_must_come_by_the_end_keeps_its_time() -> None:
+def test_what_must_come_by_the_end_keeps_its_time():
     late = flat("2 h", expect={"cleans": "eventually(room(bolt) == storage)"})
     whole = run_trial(late, nothing)
     case = Shrinker(nothing, 60).shrink(whole)
@@ -142,9 +141,7 @@ def test_what_must_come_by_the_end_keeps_its_time() -> None:
 
 
 @pytest.mark.parametrize("fails_once", [True, False])
-def test_a_report_says_when_the_failure_does_not_come_again(
-    fails_once: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_report_says_when_the_failure_does_not_come_again(fails_once, tmp_path, monkeypatch):
     drawn: list[tuple[Any, ...]] = []
     monkeypatch.setattr("fleet2d.viewing.figures.draw_failure", lambda *rest: drawn.append(rest))
     runs: list[Trial] = []

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-from tests.scenes import Cli
 
 from fleet2d.errors import InputError
 from fleet2d.testing.gate import (
@@ -61,16 +60,14 @@ def gate(new: set[int], old: set[int] | None = None, margin: float = 1.0) -> Gat
         (set(), set(range(10)), 0, 10, 2 / 2**10),
     ],
 )
-def test_pairs_that_differ_give_an_exact_p_value(
-    new: set[int], old: set[int], worse: int, better: int, p: float
-) -> None:
+def test_pairs_that_differ_give_an_exact_p_value(new, old, worse, better, p):
     found = change(new, old)
 
     assert (worse, better) == (len(found.worse), len(found.better))
     assert p == found.p
 
 
-def test_the_sign_test_is_that_of_the_binomial_distribution() -> None:
+def test_the_sign_test_is_that_of_the_binomial_distribution():
     from scipy.stats import binomtest
 
     for fewer, more in ((0, 1), (2, 9), (7, 7), (13, 4)):
@@ -78,7 +75,7 @@ def test_the_sign_test_is_that_of_the_binomial_distribution() -> None:
         assert expected == pytest.approx(sign_test(fewer, more), abs=1e-12)
 
 
-def test_trials_of_one_home_count_once() -> None:
+def test_trials_of_one_home_count_once():
     # Ten trials got worse, in two of four homes: that is no evidence about homes.
     found = change({seed for seed in range(20) if seed % 4 < 2}, set(), homes=4)
 
@@ -87,7 +84,7 @@ def test_trials_of_one_home_count_once() -> None:
     assert found.direction == 0
 
 
-def test_p_values_are_corrected_for_the_number_of_expectations() -> None:
+def test_p_values_are_corrected_for_the_number_of_expectations():
     names = ["one", "two", "three"]
 
     def of(failing: set[int]) -> list[Tally]:
@@ -97,7 +94,7 @@ def test_p_values_are_corrected_for_the_number_of_expectations() -> None:
     assert [3 * 2 / 2**6] * 3 == [c.p_holm for c in compare(of(set(range(6))), of(set()))]
 
 
-def test_failures_are_grouped_and_the_worst_leads() -> None:
+def test_failures_are_grouped_and_the_worst_leads():
     (each,) = tally([TEST], reports({3, 5}))
 
     assert FAILED == each.verdict
@@ -107,7 +104,7 @@ def test_failures_are_grouped_and_the_worst_leads() -> None:
     )
 
 
-def test_each_requirement_has_the_worst_verdict_and_none_covers_some() -> None:
+def test_each_requirement_has_the_worst_verdict_and_none_covers_some():
     failing = Tally("night.yaml", "quiet", tally([TEST], reports({1}))[0].outcomes, (), False)
     rows = cover(
         [*tally([TEST], reports(set())), failing], {"REQ-1": "finds Ana", "REQ-2": "greets"}
@@ -119,7 +116,7 @@ def test_each_requirement_has_the_worst_verdict_and_none_covers_some() -> None:
         cover(tally([TEST], reports(set())), {"REQ-9": "flies"})
 
 
-def test_a_python_test_with_a_rate_is_judged_by_it(fleet2d: Cli) -> None:
+def test_a_python_test_with_a_rate_is_judged_by_it(fleet2d):
     Path("home.yaml").write_text(
         "simulation: {start: 2026-01-05, duration: 2 min, seed: 1}\nfloorplan: bundled\n"
         "robots: {astro: {type: patrol, dwell: 10 s}}\n"

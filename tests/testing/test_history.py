@@ -4,7 +4,6 @@ import sqlite3
 from pathlib import Path
 
 import pytest
-from tests.scenes import Cli
 from tests.testing.test_cases import FAILS, HOLDS, written
 
 from fleet2d.errors import InputError
@@ -19,7 +18,7 @@ def report(seed: int, *, fails: bool = False, wall_s: float = 1.0) -> TrialRepor
     return TrialReport(TrialKey("home.yaml", "", seed), (outcome,), "", wall_s)
 
 
-def test_what_is_added_is_read_again_and_newer_trials_replace_older(tmp_path: Path) -> None:
+def test_what_is_added_is_read_again_and_newer_trials_replace_older(tmp_path):
     history = VerdictHistory(tmp_path / "history.db")
     history.add("2.0", PRINTS, [report(1), report(2, fails=True)])
     history.add("2.1", PRINTS, [report(1)])
@@ -32,7 +31,7 @@ def test_what_is_added_is_read_again_and_newer_trials_replace_older(tmp_path: Pa
     assert {"home.yaml": PastTrials(3, 0, 1.0)} == history.past()
 
 
-def test_trials_of_a_test_that_has_changed_are_not_compared(tmp_path: Path) -> None:
+def test_trials_of_a_test_that_has_changed_are_not_compared(tmp_path):
     history = VerdictHistory(tmp_path / "history.db")
     history.add("2.0", PRINTS, [report(1)])
 
@@ -78,8 +77,8 @@ LOCKS: list[sqlite3.Connection] = []
     ids=["garbage", "foreign", "newer", "locked", "a folder"],
 )
 def test_a_file_that_is_no_history_is_refused_before_anything_runs(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch, make: object, says: str
-) -> None:
+    fleet2d, monkeypatch, make, says
+):
     monkeypatch.setattr("fleet2d.testing.history.WAIT_S", 0.1)
     make(Path("history.db"))  # type: ignore[operator]
     code, out, err = fleet2d(
@@ -92,7 +91,7 @@ def test_a_file_that_is_no_history_is_refused_before_anything_runs(
     assert says in err
 
 
-def test_a_build_is_compared_with_one_of_the_history_and_its_trend_is_told(fleet2d: Cli) -> None:
+def test_a_build_is_compared_with_one_of_the_history_and_its_trend_is_told(fleet2d):
     path = written(apart=HOLDS, still="never(speed(astro) > 1 m/s)")
     common = ("test", path, "--seeds", "6", "--history", "history.db")
     assert fleet2d(*common, "--build", "2.0")[0] == 0
@@ -117,16 +116,14 @@ def test_a_build_is_compared_with_one_of_the_history_and_its_trend_is_told(fleet
         (["--requirements", "none.yaml"], "none.yaml"),
     ],
 )
-def test_options_that_cannot_be_followed_are_refused(
-    fleet2d: Cli, options: list[str], says: str
-) -> None:
+def test_options_that_cannot_be_followed_are_refused(fleet2d, options, says):
     code, out, err = fleet2d("test", written(apart=HOLDS), *options)
 
     assert (code, out) == (2, "")
     assert says in err
 
 
-def test_a_build_that_does_not_start_is_told_from_a_test_that_is_wrong(fleet2d: Cli) -> None:
+def test_a_build_that_does_not_start_is_told_from_a_test_that_is_wrong(fleet2d):
     Path("new.yaml").write_text("robots: {astro: {speeed: 2}}\n")
     code, out, _ = fleet2d("test", written(apart=HOLDS), "--build", "new.yaml")
 
@@ -137,7 +134,7 @@ def test_a_build_that_does_not_start_is_told_from_a_test_that_is_wrong(fleet2d: 
     assert "new doesn't pass: 1 test can't be run." in out
 
 
-def test_the_budget_prefers_what_is_unsure_and_cheap_and_says_what_it_leaves_out() -> None:
+def test_the_budget_prefers_what_is_unsure_and_cheap_and_says_what_it_leaves_out():
     past = {
         "sure": PastTrials(50, 0, 1.0),
         "unsure": PastTrials(50, 20, 1.0),
@@ -152,14 +149,14 @@ def test_the_budget_prefers_what_is_unsure_and_cheap_and_says_what_it_leaves_out
     assert (counts, notes) == plan(dict.fromkeys(past, 20), past, 10**6, 30.0)
 
 
-def test_a_budget_in_which_nothing_fits_is_refused() -> None:
+def test_a_budget_in_which_nothing_fits_is_refused():
     with pytest.raises(InputError, match=r"not one trial fits; the shortest takes 8\.0 s"):
         plan({"slow": 20}, {"slow": PastTrials(5, 0, 8.0)}, 10**6, 3.0)
     with pytest.raises(InputError, match="not one trial fits; give more runs"):
         plan({"slow": 20}, {}, 1, None, builds=2)
 
 
-def test_a_budget_of_runs_needs_no_history(fleet2d: Cli) -> None:
+def test_a_budget_of_runs_needs_no_history(fleet2d):
     written("home.yaml", apart=HOLDS)
     written("other.yaml", still=FAILS)
     code, out, _ = fleet2d("test", ".", "--seeds", "3", "--budget", "4")

@@ -5,7 +5,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -48,9 +47,7 @@ Suite = Callable[..., Result]
 
 
 @pytest.fixture
-def suite(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Suite:
+def suite(tmp_path, monkeypatch, capsys):
     """Runs tests in a folder with flat.yaml: Ana and Ben with an agenda, and a robot on its rounds."""
     agenda = {"type": "schedule", "days": AGENDA, "rest": "living_room"}
     people = {"ana": agenda, "ben": agenda}
@@ -70,7 +67,7 @@ def suite(
     return run
 
 
-def test_each_seed_is_a_run_and_the_decision_is_reported(suite: Suite) -> None:
+def test_each_seed_is_a_run_and_the_decision_is_reported(suite):
     result = suite("""
 seeds = []
 @trial("flat.yaml", seeds=12)
@@ -91,7 +88,7 @@ def test_seeds():
 
 
 @pytest.mark.slow
-def test_a_rate_is_decided_before_all_seeds_are_used(suite: Suite) -> None:
+def test_a_rate_is_decided_before_all_seeds_are_used(suite):
     result = suite("""
 @trial("flat.yaml", seeds=200, holds=0.5)
 def test_never(trial):
@@ -108,9 +105,7 @@ def test_mostly(trial):
 
 
 @pytest.mark.slow
-def test_a_failure_leaves_a_run_that_reproduces_a_picture_and_the_command(
-    suite: Suite, tmp_path: Path
-) -> None:
+def test_a_failure_leaves_a_run_that_reproduces_a_picture_and_the_command(suite, tmp_path):
     result = suite("""
 @trial("flat.yaml", seeds=3)
 def test_ana_stays(trial):
@@ -144,7 +139,7 @@ def test_ana_stays(trial):
 
 
 @pytest.mark.slow
-def test_fixtures_parameters_and_choices_of_tests_work(suite: Suite) -> None:
+def test_fixtures_parameters_and_choices_of_tests_work(suite):
     code = """
 @pytest.fixture
 def place():
@@ -165,7 +160,7 @@ class TestClass:
     assert {"passed": 2} == suite(code, "-k", "ana or method").outcomes
 
 
-def test_one_seed_can_be_run_again(suite: Suite) -> None:
+def test_one_seed_can_be_run_again(suite):
     result = suite("""
 @trial("flat.yaml", seeds=50, holds=0.9)
 def test_seed(trial):
@@ -174,7 +169,7 @@ def test_seed(trial):
     assert {"passed": 1} == result.outcomes
 
 
-def test_trials_go_round_homes_households_and_axes(suite: Suite) -> None:
+def test_trials_go_round_homes_households_and_axes(suite):
     result = suite("""
 trials = []
 @trial("flat.yaml", seeds=8, homes=["flat.json"], households={"one": {"ana": "meander"},
@@ -204,7 +199,7 @@ def test_trials():
         ("@trial('flat.yaml', seeds=3, holds=.5)\ndef test_x(trial): pass", "take 5 seeds or more"),
     ],
 )  # fmt: skip
-def test_errors_of_a_test_are_reported(suite: pytest.Pytester, code: str, words: str) -> None:
+def test_errors_of_a_test_are_reported(suite, code, words):
     result = suite(code)
     assert {"failed": 1} == result.outcomes
     assert all(word in result.text for word in words.split("…")), result.text
@@ -212,7 +207,7 @@ def test_errors_of_a_test_are_reported(suite: pytest.Pytester, code: str, words:
 
 
 @pytest.mark.slow
-def test_a_trial_without_expectation_or_assertion_is_untested(suite: Suite) -> None:
+def test_a_trial_without_expectation_or_assertion_is_untested(suite):
     result = suite("""
 def helps(trial):
     assert trial.step == 5
@@ -241,7 +236,7 @@ def test_trigger_may_be_missing(trial):
     assert any("untested" in message for message in failures)
 
 
-def test_wrong_names_are_one_line(suite: Suite) -> None:
+def test_wrong_names_are_one_line(suite):
     result = suite("""
 @trial("flat.yaml", sedes=3)
 def test_key(trial): pass
@@ -263,7 +258,7 @@ def test_body(trial):
 
 
 @pytest.mark.slow
-def test_trials_run_in_several_processes(suite: Suite, tmp_path: Path) -> None:
+def test_trials_run_in_several_processes(suite, tmp_path):
     code = """
 @pytest.mark.parametrize("number", range(4))
 @trial("flat.yaml", seeds=5)
@@ -281,11 +276,11 @@ def test_many(trial, number):
 TELLS = "= what the trials show ="
 
 
-def test_a_session_without_trials_says_nothing_of_them(suite: Suite) -> None:
+def test_a_session_without_trials_says_nothing_of_them(suite):
     assert TELLS not in suite("def test_other(): pass").text
 
 
-def test_all_that_was_skipped_is_told(suite: Suite) -> None:
+def test_all_that_was_skipped_is_told(suite):
     result = suite("""
 @pytest.mark.skip(reason="no time")
 @trial("flat.yaml")
@@ -299,7 +294,7 @@ def test_other(trial): pass
     assert "It took" not in said
 
 
-def test_one_seed_tells_little_and_how_many_more_would_tell(suite: Suite) -> None:
+def test_one_seed_tells_little_and_how_many_more_would_tell(suite):
     said = suite("""
 @trial("flat.yaml")
 def test_moves(trial):
@@ -314,9 +309,7 @@ def test_moves(trial):
 
 
 @pytest.mark.slow
-def test_what_failed_is_told_with_its_worst_seed_and_what_is_not_covered(
-    suite: Suite, tmp_path: Path
-) -> None:
+def test_what_failed_is_told_with_its_worst_seed_and_what_is_not_covered(suite, tmp_path):
     (tmp_path / "requirements.yaml").write_text("REQ-1: stands still\nREQ-2: greets\n")
     code = """
 @trial("flat.yaml", seeds=20, holds=0.9)
@@ -346,7 +339,7 @@ def test_broken(trial, broken): pass
 
 
 @pytest.mark.slow
-def test_nothing_else_imports_pytest_and_the_plugin_is_light() -> None:
+def test_nothing_else_imports_pytest_and_the_plugin_is_light():
     code = (
         "import sys, fleet2d, fleet2d.testing; fleet2d.testing.trial; assert 'pytest' not in sys.modules;"
         "[sys.modules.pop(n) for n in list(sys.modules) if n.split('.')[0] in ('fleet2d', 'numpy')];"

@@ -7,7 +7,6 @@ import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from tests.scripts import script
@@ -24,11 +23,11 @@ WORSE = tomllib.loads((FOLDER / "worse.toml").read_text())
 
 
 @pytest.fixture(scope="module")
-def week() -> ModuleType:
+def week():
     return script("examples/product_tests/test_week.py")
 
 
-def test_each_of_the_twelve_tests_has_a_worse_robot(week: ModuleType) -> None:
+def test_each_of_the_twelve_tests_has_a_worse_robot(week):
     tests = [name for name, value in vars(week).items() if hasattr(value, ATTRIBUTE)]
     assert 12 == len(tests)
     assert {name.removeprefix("test_") for name in tests} == WORSE.keys()
@@ -36,7 +35,7 @@ def test_each_of_the_twelve_tests_has_a_worse_robot(week: ModuleType) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WORSE)
-def test_tests_pass_for_the_product_and_fail_for_a_worse_robot(week: ModuleType, name: str) -> None:
+def test_tests_pass_for_the_product_and_fail_for_a_worse_robot(week, name):
     function = getattr(week, f"test_{name}")
     claim = getattr(function, ATTRIBUTE)
 
@@ -80,7 +79,7 @@ TWO_ROBOTS = sorted((FOLDER / "two_robots").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("path", TWO_ROBOTS, ids=lambda path: path.stem)
-def test_each_scenario_of_two_robots_holds_and_fails_for_ghosts(path: Path) -> None:
+def test_each_scenario_of_two_robots_holds_and_fails_for_ghosts(path):
 
     def failed(home: int, *changes: str) -> list[str]:
         floorplan = f"floorplan={{type: synthetic, seed: {home}, furnish: true}}"
@@ -94,12 +93,12 @@ def test_each_scenario_of_two_robots_holds_and_fails_for_ghosts(path: Path) -> N
     assert any(failed(home, "simulation.ghosts=true") for home in HOMES)
 
 
-def test_there_are_ten_scenarios_of_two_robots_of_at_most_twenty_lines() -> None:
+def test_there_are_ten_scenarios_of_two_robots_of_at_most_twenty_lines():
     assert 10 == len(TWO_ROBOTS)
     assert max(len(path.read_text().splitlines()) for path in TWO_ROBOTS) <= 20
 
 
-def test_scenarios_are_of_at_most_twenty_lines_and_twenty_mutants() -> None:
+def test_scenarios_are_of_at_most_twenty_lines_and_twenty_mutants():
     assert sorted(MUTANTS) == [path.stem for path in SCENARIOS]
     assert max(len(path.read_text().splitlines()) for path in SCENARIOS) <= 20
     assert len({name for names in MUTANTS.values() for name in names}) >= 20
@@ -108,7 +107,7 @@ def test_scenarios_are_of_at_most_twenty_lines_and_twenty_mutants() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("home", HOMES if THOROUGH else [0, 4])
 @pytest.mark.parametrize("scenario", MUTANTS)
-def test_each_scenario_holds_in_ten_homes(scenario: str, home: int) -> None:
+def test_each_scenario_holds_in_ten_homes(scenario, home):
     assert [] == [
         str(verdict) for verdict in verdicts(scenario, home).values() if not verdict.holds
     ]
@@ -119,7 +118,7 @@ def test_each_scenario_holds_in_ten_homes(scenario: str, home: int) -> None:
     ("scenario", "mutant"),
     some([(name, mutant) for name, mutants in MUTANTS.items() for mutant in mutants], 2),
 )
-def test_each_mutant_is_caught_in_one_of_the_homes(scenario: str, mutant: str) -> None:
+def test_each_mutant_is_caught_in_one_of_the_homes(scenario, mutant):
     content = read_document(FOLDER / f"{scenario}.yaml").data
     behavior = content["robots"]["astro"]["behaviors"][0]
     behavior["type"] = f"{Path(__file__).parent.as_posix()}/mutants:{mutant}"

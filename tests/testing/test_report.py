@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 import yaml
-from tests.scenes import Cli, scenario
+from tests.scenes import scenario
 
 FOLDER = Path(__file__).parents[2] / "examples" / "release_gate"
 
 
-def test_names_and_texts_cannot_inject_anything(fleet2d: Cli) -> None:
+def test_names_and_texts_cannot_inject_anything(fleet2d):
     evil = '<script src="https://example.org/x.js">alert(1)</script>'
     content = scenario("2 min", robots={"astro": {"type": "patrol", "dwell": "10 s"}})
     Path("home.yaml").write_text(yaml.safe_dump(content))
@@ -41,9 +41,7 @@ def test_names_and_texts_cannot_inject_anything(fleet2d: Cli) -> None:
 
 
 @pytest.mark.slow
-def test_a_week_of_a_qa_lead_ends_in_one_page_with_the_faults_that_matter(
-    fleet2d: Cli,
-) -> None:
+def test_a_week_of_a_qa_lead_ends_in_one_page_with_the_faults_that_matter(fleet2d):
     code, out, _ = fleet2d(
         "test", FOLDER / "tests", "--seeds", "20",
         "--build", FOLDER / "build-2.1.yaml", "--against", FOLDER / "build-2.0.yaml",

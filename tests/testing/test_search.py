@@ -29,7 +29,7 @@ AFAR = "robots.astro.start=[[500.0, 500.0], [600.0, 600.0]]"
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """A folder with flat.yaml: a robot that is to be in the bathroom within a minute."""
     agenda = {"type": "schedule", "days": AGENDA, "rest": "living_room"}
     content = scenario(
@@ -60,7 +60,7 @@ def falsify(*arguments: str) -> Any:
 
 
 @pytest.mark.slow
-def test_the_resulting_scenario_fails(folder: Path) -> None:
+def test_the_resulting_scenario_fails(folder):
     arguments = ("--over", OVER, "--budget", "30", "--seed", "1", "--out", "found.yaml")
     done = falsify("flat.yaml", *arguments)
     assert 1 == done.exit_code, done.output
@@ -77,19 +77,19 @@ def test_the_resulting_scenario_fails(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_test_of_a_trial_can_be_searched(folder: Path) -> None:
+def test_a_test_of_a_trial_can_be_searched(folder):
     done = falsify("test_flat.py::test_comes", "--over", OVER, "--budget", "30", "--quiet")
     assert (1, "") == (done.exit_code, done.output)
     failing = fleet2d.load_scenario("falsified.yaml")
     assert failing.robots["astro"].speed < 0.3
 
 
-def test_a_search_needs_an_axis() -> None:
+def test_a_search_needs_an_axis():
     with pytest.raises(InputError, match="nothing to search over"):
         read_space({})
 
 
-def test_a_test_that_holds_when_it_is_repeated_is_refused(folder: Path) -> None:
+def test_a_test_that_holds_when_it_is_repeated_is_refused(folder):
     (folder / "test_once.py").write_text(
         "from pathlib import Path\n"
         "from fleet2d.testing import trial\n"
@@ -107,7 +107,7 @@ def test_a_test_that_holds_when_it_is_repeated_is_refused(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None:
+def test_without_a_failure_the_smallest_margin_is_reported(folder):
     slow = "robots.astro.speed={low: 0.5, high: 0.6}"
     done = falsify("flat.yaml", "--over", slow, "--budget", "5")
     assert 0 == done.exit_code
@@ -118,7 +118,7 @@ def test_without_a_failure_the_smallest_margin_is_reported(folder: Path) -> None
 
 
 @pytest.mark.slow
-def test_it_goes_on_after_its_first_find_and_says_what_fails_apart(folder: Path) -> None:
+def test_it_goes_on_after_its_first_find_and_says_what_fails_apart(folder):
     axes = ["--over", OVER, "--over", "where={key: robots.astro.dwell, values: [1 min, 2 min]}"]
     done = falsify("flat.yaml", *axes, "--budget", "40", "--finds", "3", "--out", "found.yaml")
 
@@ -156,16 +156,14 @@ def test_it_goes_on_after_its_first_find_and_says_what_fails_apart(folder: Path)
         (["flat.yaml", "--over", AFAR, "--budget", "2"], "none of 2 runs could be done: "),
     ],
 )
-def test_wrong_input_is_refused_in_words(folder: Path, arguments: list[str], words: str) -> None:
+def test_wrong_input_is_refused_in_words(folder, arguments, words):
     done = falsify(*arguments)
     assert isinstance(done.exception, Fleet2DError), done.output
     assert words in str(done.exception)
 
 
 @pytest.mark.slow
-def test_a_planted_fault_is_detected_that_random_search_misses(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_planted_fault_is_detected_that_random_search_misses(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     import falsify as benchmark
 
@@ -179,7 +177,7 @@ def test_a_planted_fault_is_detected_that_random_search_misses(
     sys.modules.pop("falsify")
 
 
-def test_a_search_is_the_same_again() -> None:
+def test_a_search_is_the_same_again():
     space = read_space({"a.b": {"low": 0, "high": 1}, "c": {"key": "d.e", "values": [1, 2]}})
     draws = [space.draw(random.Random(3)) for _ in range(2)]
     assert draws[0] == draws[1]
@@ -188,19 +186,19 @@ def test_a_search_is_the_same_again() -> None:
     )
 
 
-def test_a_job_that_has_run_here_goes_to_another_process(folder: Path) -> None:
+def test_a_job_that_has_run_here_goes_to_another_process(folder):
     job = command.job_of("flat.yaml", read_space({"simulation.seed": [1, 2]}))
     margin = job.run({"simulation.seed": 1}, 3).margin
     twin = pickle.loads(pickle.dumps(job))
     assert margin == twin.run({"simulation.seed": 1}, 3).margin
 
 
-def test_axes_come_from_files_and_texts(folder: Path) -> None:
+def test_axes_come_from_files_and_texts(folder):
     (folder / "axes.yaml").write_text("axes: {home: {synthetic: 2}}\n")
     assert {"home": {"synthetic": 2}, "a.b": [1]} == parse_over(["axes.yaml", "a.b=[1]"])
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "1.5", "12345678", ""])
-def test_a_budget_is_a_number_or_a_time(text: str) -> None:
+def test_a_budget_is_a_number_or_a_time(text):
     with pytest.raises(InputError, match="expected a number of runs"):
         command.parse_budget(text)

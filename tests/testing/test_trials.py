@@ -1,7 +1,5 @@
 """A trial's life: it ends when all is decided, and margins of different units compare."""
 
-from typing import Any
-
 import pytest
 from tests.scenes import AGENDA, scenario
 
@@ -13,7 +11,7 @@ PEOPLE = {"ana": {"type": "schedule", "days": AGENDA, "rest": "living_room"}}
 FLAT = Claim(scenario("2 h", users=PEOPLE, robots={"astro": "patrol"})).variants[0]
 
 
-def test_a_trial_ends_when_all_expectations_are_decided() -> None:
+def test_a_trial_ends_when_all_expectations_are_decided():
     def soon(trial: Trial) -> None:
         trial.advance(100)
         trial.expect("eventually(distance(astro, ana) < 100 m, within=10 s)")
@@ -28,7 +26,7 @@ def test_a_trial_ends_when_all_expectations_are_decided() -> None:
     assert 7200 == late.steps
 
 
-def test_all_that_fails_is_named_with_its_step_and_margin() -> None:
+def test_all_that_fails_is_named_with_its_step_and_margin():
     def body(trial: Trial) -> None:
         trial.do(Put("ana", "kitchen"))
         trial.do(HoldStill("ana"))
@@ -46,7 +44,7 @@ def test_all_that_fails_is_named_with_its_step_and_margin() -> None:
 
 
 @pytest.mark.parametrize("without", [(), (0,), (1,)])
-def test_interventions_can_be_left_out(without: Any) -> None:
+def test_interventions_can_be_left_out(without):
     rooms = []
 
     def body(trial: Trial) -> None:
@@ -61,7 +59,7 @@ def test_interventions_can_be_left_out(without: Any) -> None:
     assert (1 not in without) == (rooms[1] == "bathroom_1")
 
 
-def test_margins_of_any_unit_compare() -> None:
+def test_margins_of_any_unit_compare():
     values = [comparable(value, 1.0) for value in (float("-inf"), -3, -0.1, 0.1, 3, float("inf"))]
     assert sorted(values) == values
     assert (-1, 1) == (values[0], values[-1])

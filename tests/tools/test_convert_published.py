@@ -123,7 +123,7 @@ USUAL = [
 
 
 @pytest.fixture
-def folder(tmp_path: Path, shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, shared_data, monkeypatch):
     """A folder with the plan that the published Fleet2D ships with."""
     (tmp_path / "home").mkdir()
     (tmp_path / "home" / "plan.json").write_bytes((shared_data / "houseexpo" / PLAN).read_bytes())
@@ -165,7 +165,7 @@ def plan_of(scenario: Scenario) -> tuple[str, Path, float]:
 # Every key
 
 
-def test_whole_configuration_becomes_the_scenario_it_means(folder: Path) -> None:
+def test_whole_configuration_becomes_the_scenario_it_means(folder):
     remarks, scenario = converted(folder)
     assert remarks == USUAL
     simulation = scenario.simulation
@@ -206,7 +206,7 @@ def test_whole_configuration_becomes_the_scenario_it_means(folder: Path) -> None
     )
 
 
-def test_converted_scenario_runs_for_two_hours(folder: Path) -> None:
+def test_converted_scenario_runs_for_two_hours(folder):
     _, scenario = converted(folder)
     run = fleet2d.run(scenario)
     assert 7200 == run.manifest["steps"]
@@ -221,7 +221,7 @@ def test_converted_scenario_runs_for_two_hours(folder: Path) -> None:
         assert len({(row["x"], row["y"]) for row in rows if row["entity"] == name}) > 5
 
 
-def test_remarks_are_in_the_new_file_as_comments(folder: Path) -> None:
+def test_remarks_are_in_the_new_file_as_comments(folder):
     remarks, _ = converted(folder, ("ppm: 20", 'ppm: 20\n    "odd\\nkey": 1'))
     lines = (folder / "new.yaml").read_text().splitlines()
     comment = " ".join(" ".join(line[2:] for line in lines if line.startswith("#")).split())
@@ -233,7 +233,7 @@ def test_remarks_are_in_the_new_file_as_comments(folder: Path) -> None:
         assert remark.replace("\n", "?") in comment
 
 
-def test_steps_of_other_length_keep_the_walk_per_step(folder: Path) -> None:
+def test_steps_of_other_length_keep_the_walk_per_step(folder):
     _, scenario = converted(folder, ("seconds: 1\n    minutes: 0", "milliseconds: 250"))
     user = scenario.users["user0"]
     assert (0.4, 30.0, 300.0) == (user.speed, walk(user).turn_std_deg, user.turn_rate_deg)
@@ -241,7 +241,7 @@ def test_steps_of_other_length_keep_the_walk_per_step(folder: Path) -> None:
     assert timedelta(seconds=150) == scenario.artifacts.trajectories
 
 
-def test_walk_of_one_step_is_a_tenth_of_a_metre_and_turns_fifteen_degrees(folder: Path) -> None:
+def test_walk_of_one_step_is_a_tenth_of_a_metre_and_turns_fifteen_degrees(folder):
     _, scenario = converted(folder)
     simulation = fleet2d.Simulation(scenario)
     moves, turns = [], []
@@ -258,9 +258,7 @@ def test_walk_of_one_step_is_a_tenth_of_a_metre_and_turns_fifteen_degrees(folder
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])
-def test_change_of_the_configuration_changes_the_scenario(
-    folder: Path, case: dict[str, Any]
-) -> None:
+def test_change_of_the_configuration_changes_the_scenario(folder, case):
     every_remark, _ = converted(folder, *case["change"].items())
     remarks = [
         remark.replace(str(folder), "home") for remark in every_remark if remark not in USUAL
@@ -277,14 +275,14 @@ def test_change_of_the_configuration_changes_the_scenario(
     assert not any(case.get("lacks", "\0") in remark for remark in every_remark)
 
 
-def test_walks_stay_at_walls_as_there(folder: Path) -> None:
+def test_walks_stay_at_walls_as_there(folder):
     _, scenario = converted(folder)
     bodies = [*scenario.users.values(), *scenario.robots.values()]
     walks = [behavior for body in bodies for behavior in body.behaviors]
     assert {"stay"} == {walk.at_walls for walk in walks}
 
 
-def test_save_false_stores_nothing(folder: Path) -> None:
+def test_save_false_stores_nothing(folder):
     remarks, scenario = converted(folder, ("save: True", "save: False"))
     assert "off" == scenario.artifacts.trajectories
     stored = scenario.artifacts
@@ -296,7 +294,7 @@ def test_save_false_stores_nothing(folder: Path) -> None:
     assert [] == list(fleet2d.run(scenario, "simulation.duration=1 min").tables)
 
 
-def test_path_counts_from_the_top_of_a_repository_above_the_file(folder: Path) -> None:
+def test_path_counts_from_the_top_of_a_repository_above_the_file(folder):
     deep = folder / "src" / "configs"
     deep.mkdir(parents=True)
     (deep / "old.yaml").write_text(OLD)
@@ -305,9 +303,7 @@ def test_path_counts_from_the_top_of_a_repository_above_the_file(folder: Path) -
     assert folder / "plan.json" == plan_of(load_scenario(deep / "new.yaml"))[1]
 
 
-def test_path_counts_from_the_current_folder(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_path_counts_from_the_current_folder(folder, tmp_path, monkeypatch):
     (tmp_path / "other").mkdir()
     monkeypatch.chdir(folder)
     old = written(tmp_path / "other")
@@ -315,7 +311,7 @@ def test_path_counts_from_the_current_folder(
     assert "plan.json" == read_document(Path("new.yaml")).data["floorplan"]["path"]
 
 
-def test_path_of_no_file_is_kept_and_remarked(folder: Path) -> None:
+def test_path_of_no_file_is_kept_and_remarked(folder):
     old = written(folder, ('"plan.json"', '"f2d/he/gone.json"'))
     remarks = convert_file(old, folder / "new.yaml")
     assert [
@@ -331,7 +327,7 @@ def test_path_of_no_file_is_kept_and_remarked(folder: Path) -> None:
     assert 7200 == load_scenario(folder / "new.yaml").simulation.steps
 
 
-def test_start_in_a_wall_moves_to_the_nearest_free_point(folder: Path) -> None:
+def test_start_in_a_wall_moves_to_the_nearest_free_point(folder):
     remarks, scenario = converted(folder, ("x: 8.0", "x: -3.0"))
     (moved,) = [remark for remark in remarks if remark not in USUAL]
     start = scenario.users["user0"].start
@@ -343,7 +339,7 @@ def test_start_in_a_wall_moves_to_the_nearest_free_point(folder: Path) -> None:
     fleet2d.Simulation(scenario)  # would refuse a start in a wall
 
 
-def test_start_is_moved_for_a_body_too_wide_for_it(folder: Path) -> None:
+def test_start_is_moved_for_a_body_too_wide_for_it(folder):
     remarks, scenario = converted(folder, ("radius: 0.2", "radius: 2"))
     fleet2d.Simulation(scenario)
     assert ["users.user0.base.pose_config.init_pose"] == [
@@ -351,7 +347,7 @@ def test_start_is_moved_for_a_body_too_wide_for_it(folder: Path) -> None:
     ]
 
 
-def test_no_stride_stands_still(folder: Path) -> None:
+def test_no_stride_stands_still(folder):
     remarks, scenario = converted(folder, ("lin_speed: 0.1", "lin_speed: 0"))
     assert (
         "users.user0.base.pose_config.meander_strategy.lin_speed: missing, 0 or below 0.01 m/s;"
@@ -363,7 +359,7 @@ def test_no_stride_stands_still(folder: Path) -> None:
     assert before == simulation.state["user0"]
 
 
-def test_missing_parts_get_what_the_remarks_say(folder: Path) -> None:
+def test_missing_parts_get_what_the_remarks_say(folder):
     text = """\
 simulation: {duration: {hours: 2}}
 floorplan: {type: he, he: {json_fpath: plan.json}}
@@ -393,7 +389,7 @@ robot: {base: {radius: 0.1, fov_config: {}}}
     assert 2 == len(fleet2d.Simulation(scenario).state)
 
 
-def test_remarks_on_a_robot_come_before_those_on_its_camera(folder: Path) -> None:
+def test_remarks_on_a_robot_come_before_those_on_its_camera(folder):
     remarks, _ = converted(folder, ("radius: 0.1\n", "radius: 0\n"))
     keys = [remark.partition(":")[0] for remark in remarks]
 
@@ -402,7 +398,7 @@ def test_remarks_on_a_robot_come_before_those_on_its_camera(folder: Path) -> Non
     )
 
 
-def test_no_robot(folder: Path) -> None:
+def test_no_robot(folder):
     text = OLD[: OLD.index("robot:")]
     (folder / "old.yaml").write_text(text)
     remarks = convert_file(folder / "old.yaml", folder / "new.yaml")
@@ -455,7 +451,7 @@ def test_no_robot(folder: Path) -> None:
         ("seed: 4", "seed: [", "old.yaml:12: not valid YAML: "),
     ],
 )  # fmt: skip
-def test_wrong_value_is_refused(folder: Path, before: str, after: str, message: str) -> None:
+def test_wrong_value_is_refused(folder, before, after, message):
     assert message in refused(folder, (before, after))
 
 
@@ -473,37 +469,37 @@ def test_wrong_value_is_refused(folder: Path, before: str, after: str, message: 
         ("simulation: {}\nfloorplan: {type: he, he: {json_fpath: plan.json}}", "duration: missing"),
     ],
 )
-def test_other_files_are_refused(folder: Path, text: str, message: str) -> None:
+def test_other_files_are_refused(folder, text, message):
     assert message in refused(folder, text=text)
 
 
-def test_no_file_is_refused(folder: Path) -> None:
+def test_no_file_is_refused(folder):
     with pytest.raises(InputError, match=r"there is no file .*none\.yaml"):
         convert_file(folder / "none.yaml", folder / "new.yaml")
 
 
-def test_plan_that_is_no_plan_is_refused(folder: Path) -> None:
+def test_plan_that_is_no_plan_is_refused(folder):
     (folder / "plan.json").write_text("{}")
     with pytest.raises(FloorPlanError, match="is not a floor plan that Fleet2D can read"):
         convert_file(written(folder), folder / "new.yaml")
     assert not (folder / "new.yaml").exists()
 
 
-def test_body_too_wide_for_the_plan_is_refused(folder: Path) -> None:
+def test_body_too_wide_for_the_plan_is_refused(folder):
     (folder / "plan.json").write_text('{"verts": [[0, 0], [3, 0], [3, 3], [0, 3]]}')
     assert "robot.base.radius: a body of radius 2 m fits nowhere in plan" in refused(
         folder, ("radius: 0.1", "radius: 2")
     )
 
 
-def test_existing_file_is_not_overwritten(folder: Path) -> None:
+def test_existing_file_is_not_overwritten(folder):
     (folder / "new.yaml").write_text("mine")
     with pytest.raises(InputError, match="exists: choose another name, or remove it"):
         convert_file(written(folder), folder / "new.yaml")
     assert "mine" == (folder / "new.yaml").read_text()
 
 
-def test_file_in_no_folder_is_refused(folder: Path) -> None:
+def test_file_in_no_folder_is_refused(folder):
     with pytest.raises(InputError, match=r"new\.yaml can't be written: there is no folder"):
         convert_file(written(folder), folder / "none" / "new.yaml")
 
@@ -515,13 +511,7 @@ def test_file_in_no_folder_is_refused(folder: Path) -> None:
         (errno.EROFS, InputError, "can't be written: Read-only file system; choose another place"),
     ],
 )
-def test_file_that_cannot_be_written_leaves_nothing(
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    code: int,
-    kind: type[Exception],
-    message: str,
-) -> None:
+def test_file_that_cannot_be_written_leaves_nothing(folder, monkeypatch, code, kind, message):
     def fail(descriptor: int) -> None:
         raise OSError(code, os.strerror(code))
 
@@ -540,9 +530,7 @@ def call(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     return main()
 
 
-def test_script_converts_and_the_scenario_is_valid(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_script_converts_and_the_scenario_is_valid(folder, monkeypatch, capsys):
     from typer.testing import CliRunner
 
     written(folder)
@@ -554,8 +542,6 @@ def test_script_converts_and_the_scenario_is_valid(
     assert result.output.startswith("ok: 2 users and 1 robot in ")
 
 
-def test_script_says_what_is_wrong_in_a_line(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_script_says_what_is_wrong_in_a_line(folder, monkeypatch, capsys):
     assert 2 == call(monkeypatch, "home/old.yaml", "home/new.yaml")
     assert "error: there is no file home/old.yaml.\n" == capsys.readouterr().err

@@ -1,9 +1,5 @@
 """Runs that the tests of the viewer look at."""
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
 import pytest
 from tests.viewing.browser import chromium
 
@@ -21,7 +17,7 @@ SCENARIO = {
 
 
 @pytest.fixture(scope="session", autouse=True)
-def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+def state_home(tmp_path_factory):
     """Keep the token of pages out of the state folder of whoever runs the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
@@ -29,14 +25,14 @@ def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     """A browser for the tests of a module."""
     with chromium() as started:
         yield started
 
 
 @pytest.fixture(scope="session")
-def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_dir(tmp_path_factory):
     """A stored run of nine hours with doors and a layer."""
     folder = tmp_path_factory.mktemp("viewer") / "first"
     fleet2d.run(SCENARIO, out=folder)
@@ -44,7 +40,7 @@ def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def other_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def other_dir(tmp_path_factory):
     """The same with another seed."""
     folder = tmp_path_factory.mktemp("viewer") / "second"
     fleet2d.run(SCENARIO, out=folder, seed=12)

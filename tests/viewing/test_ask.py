@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -189,9 +188,7 @@ def asked(page: Any, question: str) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
-def test_answers_of_the_page_are_those_of_the_tables(
-    browser: Any, tmp_path: Path, name: str
-) -> None:
+def test_answers_of_the_page_are_those_of_the_tables(browser, tmp_path, name):
     simulation = {"start": "2026-01-05", "duration": f"{HOURS} h", "seed": 5}
     root = tmp_path / name
     home = {"simulation": simulation, "floorplan": {"type": "bundled"}}

@@ -26,13 +26,13 @@ AXE = ROOT / "page" / "node_modules" / "axe-core" / "axe.min.js"
 
 
 @pytest.fixture(scope="module")
-def address(run_dir: Path) -> Iterator[str]:
+def address(run_dir):
     with served(run_dir) as started:
         yield started
 
 
 @pytest.fixture
-def page(browser: Any, address: str) -> Iterator[Any]:
+def page(browser, address):
     with page_at(browser, address) as opened:
         yield opened
 
@@ -81,7 +81,7 @@ def place_in(page: Any, plan: int, room: str) -> tuple[float, float]:
 
 
 @pytest.fixture(scope="module")
-def month(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def month(tmp_path_factory):
     """A stored run of three days."""
     folder = tmp_path_factory.mktemp("days") / "run"
     fleet2d.run("bundled:paper", "simulation.duration=3 d", out=folder)
@@ -92,7 +92,7 @@ def shown_step(page: Any) -> int:
     return int(page.get_attribute(".overview", "aria-valuenow"))
 
 
-def test_run_opens_in_motion_in_a_morning(browser: Any, month: Path) -> None:
+def test_run_opens_in_motion_in_a_morning(browser, month):
     with served(month) as address, page_at(browser, f"{address}#") as page:
         page.wait_for_selector("button.play[aria-pressed=true]")
         first = shown_step(page)
@@ -101,7 +101,7 @@ def test_run_opens_in_motion_in_a_morning(browser: Any, month: Path) -> None:
         assert 1 == page.locator(".calendar").count()
 
 
-def test_who_wants_less_motion_finds_the_run_paused(browser: Any, month: Path) -> None:
+def test_who_wants_less_motion_finds_the_run_paused(browser, month):
     with (
         served(month) as address,
         page_at(browser, f"{address}#", reduced_motion="reduce") as page,
@@ -112,7 +112,7 @@ def test_who_wants_less_motion_finds_the_run_paused(browser: Any, month: Path) -
         assert first == shown_step(page)
 
 
-def test_click_in_the_calendar_goes_to_that_day_and_hour(browser: Any, month: Path) -> None:
+def test_click_in_the_calendar_goes_to_that_day_and_hour(browser, month):
     run = fleet2d.open_run(month)
     activities = [e for e in run.tables["events"].to_pylist() if e["event"] == "activity"]
     away = run.path("ana", every=timedelta(seconds=1)).away
@@ -151,7 +151,7 @@ def shows_step(page: Any, step: int) -> None:
     page.wait_for_selector(f"table.now[data-step='{step}']", timeout=5000)
 
 
-def test_what_is_shown_at_random_moments_is_what_the_tables_say(page: Any, run_dir: Path) -> None:
+def test_what_is_shown_at_random_moments_is_what_the_tables_say(page, run_dir):
     run = fleet2d.open_run(run_dir)
     paths = {name: run.path(name, timedelta(seconds=1)) for name in ("ana", "astro")}
     count = 100 if THOROUGH else 12
@@ -167,7 +167,7 @@ def test_what_is_shown_at_random_moments_is_what_the_tables_say(page: Any, run_d
             assert room == row.get_attribute("data-room")
 
 
-def test_observations_at_a_moment_are_those_of_the_table(page: Any, run_dir: Path) -> None:
+def test_observations_at_a_moment_are_those_of_the_table(page, run_dir):
     table = fleet2d.open_run(run_dir).tables["observations"]
     step = table["step"].to_pylist()[len(table) // 2]
     page.fill("#goto", f"step {step}")
@@ -185,7 +185,7 @@ def shares_are(page: Any, believed: dict[str, float]) -> bool:
     return shown == pytest.approx(expected, abs=1e-9) and bool(shown or not believed)
 
 
-def test_beliefs_are_those_of_the_table(page: Any, run_dir: Path) -> None:
+def test_beliefs_are_those_of_the_table(page, run_dir):
     run = fleet2d.open_run(run_dir)
     table = run.tables["ltp"].to_pylist()
     steps = np.random.default_rng(5).choice(run.manifest["steps"], 100 if THOROUGH else 4).tolist()
@@ -214,9 +214,7 @@ BELIEFS = {
 
 
 @pytest.mark.slow
-def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(browser, tmp_path):
     ben = {"type": "routine", "persona": "works_outside"}
     root = tmp_path / "run"
     run = fleet2d.run(
@@ -250,7 +248,7 @@ def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(
                     assert [100, 100] == [sum(parts[::2]), sum(parts[1::2])]
 
 
-def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
+def test_dragging_over_the_timeline_scrubs(page):
     box = page.locator(".lanes").bounding_box()
     page.mouse.move(box["x"] + box["width"] * 0.25, box["y"] + 60)
     page.mouse.down()
@@ -259,7 +257,7 @@ def test_dragging_over_the_timeline_scrubs(page: Any) -> None:
     until(page, lambda: 0.75 * 9 * 3600 == pytest.approx(moment(page), rel=0.01))
 
 
-def test_playing_passes_time_at_the_chosen_speed(page: Any) -> None:
+def test_playing_passes_time_at_the_chosen_speed(page):
     page.select_option("select[aria-label=Speed]", "600")
     page.click("button.play")
     until(page, lambda: moment(page) > 300)
@@ -270,7 +268,7 @@ def test_playing_passes_time_at_the_chosen_speed(page: Any) -> None:
     assert stopped == moment(page)
 
 
-def test_panels_keep_up_with_the_timeline_while_an_hour_passes_in_a_second(page: Any) -> None:
+def test_panels_keep_up_with_the_timeline_while_an_hour_passes_in_a_second(page):
     page.select_option("select[aria-label=Speed]", "3600")
     page.click("button.play")
     shown = """[document.querySelector('.lanes').ariaValueNow,
@@ -285,7 +283,7 @@ def test_panels_keep_up_with_the_timeline_while_an_hour_passes_in_a_second(page:
     assert all(timeline == panel for timeline, panel in pairs)
 
 
-def test_keyboard_alone_moves_zooms_plays_and_opens_panels(page: Any) -> None:
+def test_keyboard_alone_moves_zooms_plays_and_opens_panels(page):
     page.keyboard.press("Home")
     for key in ("ArrowRight", ".", ".", ","):
         page.keyboard.press(key)
@@ -307,7 +305,7 @@ def test_keyboard_alone_moves_zooms_plays_and_opens_panels(page: Any) -> None:
     until(page, lambda: theme != page.get_attribute("html", "data-theme"))
 
 
-def test_tab_reaches_every_control_and_focus_can_be_seen(page: Any) -> None:
+def test_tab_reaches_every_control_and_focus_can_be_seen(page):
     names = set()
     for _ in range(40):
         page.keyboard.press("Tab")
@@ -315,7 +313,7 @@ def test_tab_reaches_every_control_and_focus_can_be_seen(page: Any) -> None:
     assert {"play", "goto", "lanes", "panel", "tab-now"} <= names
 
 
-def test_events_are_filtered_searched_and_jumped_to(page: Any, run_dir: Path) -> None:
+def test_events_are_filtered_searched_and_jumped_to(page, run_dir):
     events = fleet2d.open_run(run_dir).tables["events"]
     activities = [row for row in events.to_pylist() if row["event"] == "activity"]
     page.click("#tab-events")
@@ -329,7 +327,7 @@ def test_events_are_filtered_searched_and_jumped_to(page: Any, run_dir: Path) ->
     shows_moment(page, activities[0]["step"])
 
 
-def test_last_sighting_before_a_time_is_one_question(page: Any, run_dir: Path) -> None:
+def test_last_sighting_before_a_time_is_one_question(page, run_dir):
     stored = fleet2d.open_run(run_dir).tables["observations"].to_pylist()
     before = 8 * 3600
     seen = [row["step"] for row in stored if row["user"] == "ana" and row["step"] < before]
@@ -428,7 +426,7 @@ class Tasks:
 
 
 @pytest.mark.slow
-def test_each_task_takes_one_or_two_actions(browser: Any) -> None:
+def test_each_task_takes_one_or_two_actions(browser):
     run = fleet2d.run(
         "bundled:paper",
         "simulation.duration=2 d",
@@ -446,7 +444,7 @@ def test_each_task_takes_one_or_two_actions(browser: Any) -> None:
             assert tasks.actions <= 1 + (task in two), task
 
 
-def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
+def test_address_holds_the_moment_and_the_view(browser, page):
     page.fill("#goto", "day 1 05:00")
     page.press("#goto", "Enter")
     page.click("#tab-layers")
@@ -461,9 +459,7 @@ def test_address_holds_the_moment_and_the_view(browser: Any, page: Any) -> None:
 
 
 @pytest.mark.slow
-def test_note_at_a_moment_is_kept_and_found_again(
-    browser: Any, run_dir: Path, tmp_path: Path
-) -> None:
+def test_note_at_a_moment_is_kept_and_found_again(browser, run_dir, tmp_path):
     root = shutil.copytree(run_dir, tmp_path / "day")
     with served(root) as address:
         with page_at(browser, address) as page:
@@ -484,7 +480,7 @@ def test_note_at_a_moment_is_kept_and_found_again(
 
 
 @pytest.mark.slow
-def test_link_to_a_moment_is_copied(browser: Any, address: str) -> None:
+def test_link_to_a_moment_is_copied(browser, address):
     permissions = ["clipboard-read", "clipboard-write"]
     with page_at(browser, address, permissions=permissions) as page:
         page.fill("#goto", "day 1 05:00")
@@ -499,7 +495,7 @@ def test_link_to_a_moment_is_copied(browser: Any, address: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("zone", ["Pacific/Auckland", "America/Los_Angeles", "Asia/Kathmandu"])
-def test_times_are_the_home_s_in_every_time_zone(browser: Any, address: str, zone: str) -> None:
+def test_times_are_the_home_s_in_every_time_zone(browser, address, zone):
     with page_at(browser, f"{address}#panel=metrics", timezone_id=zone) as page:
         page.fill("#goto", "Mon 5 Jan 08:30")
         page.press("#goto", "Enter")
@@ -508,7 +504,7 @@ def test_times_are_the_home_s_in_every_time_zone(browser: Any, address: str, zon
         until(page, lambda: "at=2026-01-05T08%3A30%3A00" in page.url)
 
 
-def test_lanes_fold_are_pinned_hidden_and_filtered(page: Any) -> None:
+def test_lanes_fold_are_pinned_hidden_and_filtered(page):
     labels = page.locator(".label .name")
     expected = {"Users (1)", "Robots (1)", "Ana", "Ana does", "Astro sees Ana"}
     until(page, lambda: expected <= set(labels.all_inner_texts()))
@@ -534,7 +530,7 @@ def seconds_in(words: str) -> int:
     return sum(int(n) * units[u] for n, u in re.findall(r"(?<!_)\b(\d+) (h|min|s)\b", words))
 
 
-def test_marked_range_has_totals_that_fill_it(page: Any) -> None:
+def test_marked_range_has_totals_that_fill_it(page):
     box = page.locator(".lanes").bounding_box()
     page.keyboard.down("Shift")
     page.mouse.move(box["x"] + box["width"] / 3, box["y"] + 60)
@@ -548,7 +544,7 @@ def test_marked_range_has_totals_that_fill_it(page: Any) -> None:
     page.locator(".totals").wait_for(state="detached")
 
 
-def test_zoom_is_undone_and_keys_are_shown(page: Any) -> None:
+def test_zoom_is_undone_and_keys_are_shown(page):
     page.keyboard.press("+")
     until(page, lambda: "from=" in page.url)
     page.keyboard.press("z")
@@ -557,7 +553,7 @@ def test_zoom_is_undone_and_keys_are_shown(page: Any) -> None:
     page.wait_for_selector("details.help dl")
 
 
-def test_body_is_followed_and_pointed_at(page: Any) -> None:
+def test_body_is_followed_and_pointed_at(page):
     page.click("tr[data-body=ana] button")
     page.click("text=Follow ana")
     name = page.locator(".plan .hover >> text=ana")
@@ -574,13 +570,13 @@ def test_body_is_followed_and_pointed_at(page: Any) -> None:
     page.wait_for_selector("text=Follow ana")
 
 
-def test_any_column_of_a_table_is_plotted(page: Any) -> None:
+def test_any_column_of_a_table_is_plotted(page):
     page.click("#tab-metrics")
     page.select_option("[aria-label='Column to plot']", "key_frames.x")
     page.wait_for_selector("[aria-label='x of key_frames over the run'] canvas")
 
 
-def test_layers_and_switches_change_the_plan(page: Any) -> None:
+def test_layers_and_switches_change_the_plan(page):
     page.click("#tab-layers")
     pictures = {page.locator(".plan canvas.top").screenshot()}
     for switch in ("[name=names]", "[name=furniture]", "[name=sight]", "[name=layer] >> nth=1"):
@@ -588,7 +584,7 @@ def test_layers_and_switches_change_the_plan(page: Any) -> None:
         add_new_picture(page, pictures)
 
 
-def test_layer_of_another_moment_says_so(page: Any, run_dir: Path) -> None:
+def test_layer_of_another_moment_says_so(page, run_dir):
     stored = fleet2d.open_run(run_dir).tables["layer.dust"]["step"].to_pylist()
     assert {9 * 3600 - 1} == set(stored)
     page.click("#tab-layers")
@@ -599,9 +595,7 @@ def test_layer_of_another_moment_says_so(page: Any, run_dir: Path) -> None:
 
 
 @pytest.mark.slow
-def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(
-    browser: Any, tmp_path: Path
-) -> None:
+def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(browser, tmp_path):
     root = tmp_path / "minutes"
     run = fleet2d.run("bundled:paper", "simulation={duration: 8 h, step: 1 min}", seed=4, out=root)
     paths = {name: run.path(name, timedelta(minutes=1)) for name in ("ana", "astro")}
@@ -624,14 +618,14 @@ def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(
             page.wait_for_selector(f"[data-inspected=astro] >> text={place}")
 
 
-def test_click_on_a_body_shows_its_state_and_history(page: Any) -> None:
+def test_click_on_a_body_shows_its_state_and_history(page):
     page.click("tr[data-body=astro] button")
     page.wait_for_selector("[data-inspected=astro]")
     until(page, lambda: "patrol, hangout" in page.inner_text("[data-inspected=astro]"))
     page.locator("[data-inspected=astro] ol.events li").nth(1).wait_for()
 
 
-def test_decision_behind_what_a_robot_does_is_shown(page: Any, run_dir: Path) -> None:
+def test_decision_behind_what_a_robot_does_is_shown(page, run_dir):
     page.click("tr[data-body=astro] button")
     events = fleet2d.open_run(run_dir).tables["events"].to_pylist()
     explores = next(row for row in events if row["event"] == "explores")
@@ -646,7 +640,7 @@ def test_decision_behind_what_a_robot_does_is_shown(page: Any, run_dir: Path) ->
 
 
 @pytest.mark.slow
-def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
+def test_lights_and_slow_floors_are_shown(browser):
     area = [[11.0, 1.0], [14.0, 1.0], [14.0, 4.0], [11.0, 4.0]]
     run = fleet2d.run(
         "bundled:paper",
@@ -671,7 +665,7 @@ def test_lights_and_slow_floors_are_shown(browser: Any) -> None:
 
 
 @pytest.mark.slow
-def test_violation_is_the_first_thing_on_the_page_and_a_click_goes_there(browser: Any) -> None:
+def test_violation_is_the_first_thing_on_the_page_and_a_click_goes_there(browser):
     run = fleet2d.run(
         "bundled:paper",
         "simulation.duration=2 h",
@@ -693,13 +687,13 @@ def test_violation_is_the_first_thing_on_the_page_and_a_click_goes_there(browser
         assert alarm != note.evaluate("element => getComputedStyle(element).color")
 
 
-def test_page_of_a_run_without_expectations_has_no_alarm(page: Any) -> None:
+def test_page_of_a_run_without_expectations_has_no_alarm(page):
     assert 0 == page.locator(".violated, .status").count()
     assert 0 == page.locator(".verdict").count()
 
 
 @pytest.mark.slow
-def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_path: Path) -> None:
+def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser, tmp_path):
     av = pytest.importorskip("av", reason="PyAV is not installed")
     run = fleet2d.run(
         "bundled:paper",
@@ -719,7 +713,7 @@ def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser: Any, tmp_
 
 
 @pytest.mark.slow
-def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: Path) -> None:
+def test_two_runs_are_compared_in_step(browser, run_dir, other_dir):
     with served(run_dir, other_dir) as address, page_at(browser, address) as page:
         until(page, lambda: page.locator(".plan canvas.top").count() == 2)
         page.wait_for_selector(".labels button >> text=rooms differ")
@@ -735,7 +729,7 @@ def test_two_runs_are_compared_in_step(browser: Any, run_dir: Path, other_dir: P
             page.wait_for_selector(f".label .name >> text=/^ltp of ana · {name}/")
 
 
-def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_path: Path) -> None:
+def test_exported_file_plays_without_a_server(browser, run_dir, tmp_path):
     target = tmp_path / "part.html"
     run = fleet2d.open_run(run_dir)
     export_html(run, target, 3600, 3 * 3600)
@@ -750,7 +744,7 @@ def test_exported_file_plays_without_a_server(browser: Any, run_dir: Path, tmp_p
 
 
 @pytest.mark.slow
-def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
+def test_fifty_users_are_shown(browser, tmp_path):
     people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
     run = fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=4, users=people)
     with served(PageData(run)) as address, page_at(browser, address) as page:
@@ -761,7 +755,7 @@ def test_fifty_users_are_shown(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
+def test_plan_of_4000_vertices_is_shown(browser, tmp_path):
     turns = [2 * math.pi * i / 4000 for i in range(4000)]
     far = [5 + 0.2 * (i * 7919 % 5) / 5 + math.sin(3 * turn) for i, turn in enumerate(turns)]
     corners = [[8 + r * math.cos(a), 8 + r * math.sin(a)] for r, a in zip(far, turns, strict=True)]
@@ -784,14 +778,14 @@ def test_plan_of_4000_vertices_is_shown(browser: Any, tmp_path: Path) -> None:
         add_new_picture(page, pictures)
 
 
-def test_damaged_run_is_explained_on_the_page(browser: Any, tmp_path: Path) -> None:
+def test_damaged_run_is_explained_on_the_page(browser, tmp_path):
     (tmp_path / "manifest.json").write_text('{"format": 99}')
     with served(tmp_path) as address, page_at(browser, address) as page:
         assert "later Fleet2D" in page.inner_text(".failure")
 
 
 @pytest.mark.slow
-def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
+def test_live_run_is_stepped_paused_and_steered(browser):
     simulation = fleet2d.Simulation(
         "bundled:paper",
         "simulation.duration=6 h",
@@ -832,9 +826,7 @@ def test_live_run_is_stepped_paused_and_steered(browser: Any) -> None:
 
 
 @pytest.mark.slow
-def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
-    browser: Any, run_dir: Path, tmp_path: Path
-) -> None:
+def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(browser, run_dir, tmp_path):
     parent = shutil.copytree(run_dir, tmp_path / "day")
     with served(parent) as address:
         at = 4 * 3600
@@ -873,7 +865,7 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(
     assert fleet2d.reproduce(branch).same
 
 
-def test_page_works_in_the_frame_of_a_notebook(browser: Any, run_dir: Path) -> None:
+def test_page_works_in_the_frame_of_a_notebook(browser, run_dir):
     """Jupyter and marimo show the page in a frame that may run scripts, and nothing else."""
     document = html_of([embedded_run(PageData(fleet2d.open_run(run_dir)), 0, 9 * 3600)])
     page = browser.new_page()
@@ -892,7 +884,7 @@ def test_page_works_in_the_frame_of_a_notebook(browser: Any, run_dir: Path) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing(browser: Any, address: str, scheme: str) -> None:
+def test_axe_finds_nothing(browser, address, scheme):
     if not AXE.exists():
         pytest.skip("axe-core is not installed: npm ci in page/")
     found = []
@@ -909,12 +901,12 @@ def test_axe_finds_nothing(browser: Any, address: str, scheme: str) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 768])
-def test_narrow_screen_needs_no_sideways_scrolling(browser: Any, address: str, width: int) -> None:
+def test_narrow_screen_needs_no_sideways_scrolling(browser, address, width):
     with page_at(browser, address, viewport={"width": width, "height": 844}) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-def test_small_frame_of_a_notebook_shows_plan_and_timeline(browser: Any, address: str) -> None:
+def test_small_frame_of_a_notebook_shows_plan_and_timeline(browser, address):
     with page_at(browser, address, viewport={"width": 640, "height": 500}) as page:
         for part in (".plan canvas.top", ".lanes"):
             box = page.locator(part).bounding_box()

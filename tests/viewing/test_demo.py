@@ -3,12 +3,10 @@
 import re
 import sys
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.scenes import Cli
 
 import fleet2d as package
 from fleet2d.runs.run import open_run
@@ -18,19 +16,19 @@ DAY = ("simulation.duration=1 d", "metrics={sightings: {}, distance: {}, time_to
 
 
 @pytest.fixture(scope="module")
-def family(tmp_path_factory: pytest.TempPathFactory) -> package.Run:
+def family(tmp_path_factory):
     """A day of a family whose robot reminds and searches."""
     return package.run("bundled:family", *DAY, out=tmp_path_factory.mktemp("family"))
 
 
 @pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
+def short(monkeypatch):
     """Let the demo take a day of the bundled home."""
     set_up = demo.set_up
     monkeypatch.setattr(demo, "set_up", lambda _, *more, **wrong: set_up([*DAY], *more, **wrong))
 
 
-def test_sentences_tell_what_the_run_measured(family: package.Run) -> None:
+def test_sentences_tell_what_the_run_measured(family):
     first, *sentences = demo.sentences(family)
 
     assert first.startswith("1 d of Ana, Ben, Cleo and Astro, simulated in ")
@@ -40,7 +38,7 @@ def test_sentences_tell_what_the_run_measured(family: package.Run) -> None:
     assert f"Astro found Cleo in {events.count('found')} of 1 searches." in sentences
 
 
-def test_sentence_tells_how_long_each_person_was_seen_awake(family: package.Run) -> None:
+def test_sentence_tells_how_long_each_person_was_seen_awake(family):
     events = family.tables["events"].to_pylist()
     awake, seen = (np.zeros(family.manifest["steps"], bool) for _ in range(2))
     for event in events:  # what holds from a step on holds to the end, or to what is said next
@@ -61,7 +59,7 @@ def test_sentence_tells_how_long_each_person_was_seen_awake(family: package.Run)
     )
 
 
-def test_time_out_of_the_home_and_asleep_is_no_waking_time_at_home() -> None:
+def test_time_out_of_the_home_and_asleep_is_no_waking_time_at_home():
     said = [
         (10, "ana", "activity", None, "tv"),
         (20, "astro", "user_seen", "ana", ""),
@@ -80,7 +78,7 @@ def test_time_out_of_the_home_and_asleep_is_no_waking_time_at_home() -> None:
     assert None is demo._waking_share("ben", events, 100)
 
 
-def test_sentences_tell_how_people_answered(family: package.Run) -> None:
+def test_sentences_tell_how_people_answered(family):
     kinds = Counter(
         map(
             tuple,
@@ -102,7 +100,7 @@ def test_sentences_tell_how_people_answered(family: package.Run) -> None:
             assert (f"{count} {outcome}" in answers) == bool(count)
 
 
-def test_a_search_that_ended_at_somebody_else_is_no_find() -> None:
+def test_a_search_that_ended_at_somebody_else_is_no_find():
     ends = ["found", "false", "found", "gave_up"]
     searches = [{"robot": "astro", "user": "cleo", "end": end} for end in ends]
     others = [{"robot": "bolt", "user": "cleo", "end": "found"}]
@@ -113,7 +111,7 @@ def test_a_search_that_ended_at_somebody_else_is_no_find() -> None:
     assert said == sentence
 
 
-def test_sentence_tells_how_wrong_beliefs_were_at_first_and_at_the_end() -> None:
+def test_sentence_tells_how_wrong_beliefs_were_at_first_and_at_the_end():
     run = package.run("bundled:paper", "simulation.duration=3 d")
     errors = [row["tv"] for row in run.tables["ltp_error"].to_pylist() if row["user"] == "ana"]
 
@@ -124,7 +122,7 @@ def test_sentence_tells_how_wrong_beliefs_were_at_first_and_at_the_end() -> None
     assert f"{learned}; in the end {last}." in sentences
 
 
-def test_sentences_leave_out_what_the_run_did_not_measure() -> None:
+def test_sentences_leave_out_what_the_run_did_not_measure():
     run = package.run(
         "bundled:paper", "simulation.duration=1 h", "metrics=null", "robots=null", "algorithms=null"
     )
@@ -135,7 +133,7 @@ def test_sentences_leave_out_what_the_run_did_not_measure() -> None:
 
 
 @pytest.mark.usefixtures("short")
-def test_demo_without_the_page_ends_with_the_place_of_the_run(fleet2d: Cli, tmp_path: Path) -> None:
+def test_demo_without_the_page_ends_with_the_place_of_the_run(fleet2d, tmp_path):
     code, out, err = fleet2d("demo", "--no-view", "--out", "shown")
 
     assert (0, "") == (code, err)
@@ -145,9 +143,7 @@ def test_demo_without_the_page_ends_with_the_place_of_the_run(fleet2d: Cli, tmp_
 
 
 @pytest.mark.usefixtures("short")
-def test_demo_without_the_extra_says_how_to_get_it(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_demo_without_the_extra_says_how_to_get_it(fleet2d, monkeypatch):
     monkeypatch.setitem(sys.modules, "fleet2d.viewing.page_server", None)
     monkeypatch.delitem(sys.modules, "fleet2d.viewing.page_server")
     monkeypatch.setitem(sys.modules, "uvicorn", None)
@@ -159,9 +155,7 @@ def test_demo_without_the_extra_says_how_to_get_it(
 
 
 @pytest.mark.usefixtures("short")
-def test_demo_shows_the_page_of_its_run_in_a_new_folder(
-    fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_demo_shows_the_page_of_its_run_in_a_new_folder(fleet2d, monkeypatch):
     shown: list[Any] = []
     monkeypatch.setattr("fleet2d.viewing.command.view", shown.append)
 

@@ -1,11 +1,10 @@
 """Pictures of moments and stretches, films: written completely, in the requested format."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.scenes import Cli, scenario
+from tests.scenes import scenario
 
 import fleet2d
 from fleet2d.engine.access import evidence_of
@@ -20,14 +19,14 @@ MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".gif": b"GIF8",
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
-def test_moment_is_drawn_in_each_format(run_dir: Path, tmp_path: Path, ending: str) -> None:
+def test_moment_is_drawn_in_each_format(run_dir, tmp_path, ending):
     target = tmp_path / f"moment{ending}"
     draw_moment(fleet2d.open_run(run_dir), 20_000, target)
     assert target.read_bytes().startswith(MAGIC[ending])
 
 
 @pytest.mark.slow
-def test_same_moment_gives_the_same_bytes_and_another_others(run_dir: Path, tmp_path: Path) -> None:
+def test_same_moment_gives_the_same_bytes_and_another_others(run_dir, tmp_path):
     run = fleet2d.open_run(run_dir)
     contents = []
     for number, step in enumerate((25_000, 25_000, 30_000)):
@@ -39,19 +38,19 @@ def test_same_moment_gives_the_same_bytes_and_another_others(run_dir: Path, tmp_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["life", "heat", "strip"])
-def test_stretch_is_drawn_as_each_figure(run_dir: Path, tmp_path: Path, kind: str) -> None:
+def test_stretch_is_drawn_as_each_figure(run_dir, tmp_path, kind):
     target = tmp_path / f"{kind}.png"
     draw_stretch(fleet2d.open_run(run_dir), 3600, 20_000, target, kind)  # type: ignore[arg-type]
     assert target.stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("step", [-1, 32_400])
-def test_step_outside_the_run_is_refused(run_dir: Path, tmp_path: Path, step: int) -> None:
+def test_step_outside_the_run_is_refused(run_dir, tmp_path, step):
     with pytest.raises(InputError, match="its last is 32399"):
         draw_moment(fleet2d.open_run(run_dir), step, tmp_path / "x.png")
 
 
-def test_bodies_stand_where_the_run_has_them(run_dir: Path) -> None:
+def test_bodies_stand_where_the_run_has_them(run_dir):
     from datetime import timedelta
 
     from matplotlib.figure import Figure
@@ -67,9 +66,7 @@ def test_bodies_stand_where_the_run_has_them(run_dir: Path) -> None:
 
 
 @pytest.mark.slow
-def test_kept_pictures_of_the_lit_home_change_no_frame(
-    run_dir: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_kept_pictures_of_the_lit_home_change_no_frame(run_dir, monkeypatch):
     def filmed() -> list[U8]:
         stage = stage_of(fleet2d.open_run(run_dir), 20_000, 25_000, 100, 240)
         return [pixels.copy() for _, pixels in draw_frames(stage, 20_000, np.arange(50))]
@@ -88,7 +85,7 @@ def test_kept_pictures_of_the_lit_home_change_no_frame(
 
 
 @pytest.mark.parametrize("ending", [".gif", ".webp"])
-def test_film_of_pictures_is_written(run_dir: Path, tmp_path: Path, ending: str) -> None:
+def test_film_of_pictures_is_written(run_dir, tmp_path, ending):
     target = tmp_path / f"film{ending}"
     frames = write_film(fleet2d.open_run(run_dir), target, 24_000, 25_000, speed=600, height=240)
     assert frames > 2
@@ -97,7 +94,7 @@ def test_film_of_pictures_is_written(run_dir: Path, tmp_path: Path, ending: str)
 
 
 @pytest.mark.slow
-def test_the_pictures_of_a_film_look_as_they_were_drawn(run_dir: Path, tmp_path: Path) -> None:
+def test_the_pictures_of_a_film_look_as_they_were_drawn(run_dir, tmp_path):
     av = pytest.importorskip("av", reason="PyAV is not installed")
     run = fleet2d.open_run(run_dir)
     target = tmp_path / "film.mp4"
@@ -117,7 +114,7 @@ def test_the_pictures_of_a_film_look_as_they_were_drawn(run_dir: Path, tmp_path:
 
 
 @pytest.mark.slow
-def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir: Path, tmp_path: Path) -> None:
+def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir, tmp_path):
     av = pytest.importorskip("av", reason="PyAV is not installed")
     target = tmp_path / "film.mp4"
     write_film(fleet2d.open_run(run_dir), target, 0, 7200, speed=600, height=240)
@@ -135,9 +132,7 @@ def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir: Path, tmp_path:
         ("film.mp4", {"height": 7}, "--height"),
     ],
 )
-def test_impossible_film_is_refused(
-    run_dir: Path, tmp_path: Path, name: str, options: dict[str, float], words: str
-) -> None:
+def test_impossible_film_is_refused(run_dir, tmp_path, name, options, words):
     with pytest.raises(InputError, match=words):
         write_film(fleet2d.open_run(run_dir), tmp_path / name, 0, 100, **options)  # type: ignore[arg-type]
 
@@ -156,17 +151,13 @@ def test_impossible_film_is_refused(
         (["--log", "astro", "--layer", "dust"], "leave out the options of pictures"),
     ],
 )
-def test_show_refuses_what_is_no_picture(
-    fleet2d: Cli, run_dir: Path, words: list[str], message: str
-) -> None:
+def test_show_refuses_what_is_no_picture(fleet2d, run_dir, words, message):
     code, _, err = fleet2d("show", run_dir, *words)
     assert 2 == code
     assert message in err
 
 
-def test_the_log_of_a_robot_is_printed_or_written(
-    fleet2d: Cli, run_dir: Path, tmp_path: Path
-) -> None:
+def test_the_log_of_a_robot_is_printed_or_written(fleet2d, run_dir, tmp_path):
     words = ("show", run_dir, "--log", "astro", "--from", "2 h", "--to", "4 h")
     code, out, _ = fleet2d(*words)
     assert 0 == code
@@ -176,7 +167,7 @@ def test_the_log_of_a_robot_is_printed_or_written(
     assert out == (tmp_path / "astro.log").read_text()
 
 
-def test_the_picture_of_a_failure_says_what_failed_and_marks_it(tmp_path: Path) -> None:
+def test_the_picture_of_a_failure_says_what_failed_and_marks_it(tmp_path):
     content = scenario(
         "5 min",
         users={"ana": {"type": "meander"}},

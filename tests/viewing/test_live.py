@@ -1,9 +1,7 @@
 """A run is the same, watched or not; orders are obeyed or refused with a reason."""
 
 import json
-from collections.abc import Iterator
 from datetime import timedelta
-from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
@@ -32,14 +30,14 @@ def order(action: str, target: str = "", value: float = 0, x: float = 0, y: floa
 
 
 @pytest.fixture
-def live() -> Iterator[LiveRun]:
+def live():
     watched = LiveRun(simulation(), paused=True)
     watched.start()
     yield watched
     watched.end()
 
 
-def test_watched_run_has_the_digest_of_one_that_nobody_watches() -> None:
+def test_watched_run_has_the_digest_of_one_that_nobody_watches():
     watched = LiveRun(simulation())
     frames = watched.frames()
     watched.start()
@@ -56,7 +54,7 @@ def test_watched_run_has_the_digest_of_one_that_nobody_watches() -> None:
     assert [] == watched.run.notes
 
 
-def test_frames_have_every_event_once() -> None:
+def test_frames_have_every_event_once():
     watched = LiveRun(simulation())
     frames = watched.frames()
     next(frames)
@@ -72,7 +70,7 @@ def test_frames_have_every_event_once() -> None:
     assert sorted((r["step"], r["entity"], r["event"]) for r in rows) == sorted(events)
 
 
-def test_frames_have_every_intervention_once(live: LiveRun) -> None:
+def test_frames_have_every_intervention_once(live):
     frames = live.frames()
     next(frames)
     live.submit(order("step", value=300))
@@ -85,7 +83,7 @@ def test_frames_have_every_intervention_once(live: LiveRun) -> None:
     ]
 
 
-def test_beliefs_in_frames_sum_to_one_and_are_of_everybody() -> None:
+def test_beliefs_in_frames_sum_to_one_and_are_of_everybody():
     own = "algorithms.share={type: 'tests.own_components:Share'}"
     watched = LiveRun(fleet2d.Simulation("bundled:paper", "simulation.duration=13 h", own, seed=4))
     frames = watched.frames()
@@ -103,13 +101,13 @@ def test_beliefs_in_frames_sum_to_one_and_are_of_everybody() -> None:
     assert max(users["ana"][-1] for each in beliefs for users in each.values()) > 0  # away
 
 
-def test_steps_are_taken_one_by_one(live: LiveRun) -> None:
+def test_steps_are_taken_one_by_one(live):
     assert "" == live.submit(order("step", value=1))
     assert "" == live.submit(order("step", value=60))
     assert 61 == live.engine.simulation.step
 
 
-def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
+def test_body_is_put_somewhere_and_the_run_says_so(live):
     live.submit(order("step", value=600))
     home = live.engine.simulation.home
     x, y = home.plan.room("living_room_1").anchor_xy
@@ -124,7 +122,7 @@ def test_body_is_put_somewhere_and_the_run_says_so(live: LiveRun) -> None:
     assert len(path.x) == live.run.manifest["steps"]
 
 
-def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
+def test_robot_that_is_called_comes_and_stays(live):
     live.submit(order("step", value=60))
     x, y = live.engine.simulation.home.plan.room("kitchen_1").anchor_xy
     assert "" == live.submit(order("call", "astro", x=x, y=y))
@@ -139,7 +137,7 @@ def test_robot_that_is_called_comes_and_stays(live: LiveRun) -> None:
     assert ["send", "send"] == actions
 
 
-def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
+def test_steered_run_is_reproduced_from_its_manifest(tmp_path):
     run_dir = tmp_path / "steered"
     watched = LiveRun(
         fleet2d.Simulation("bundled:paper", "simulation.duration=3 h", DOOR, seed=4, out=run_dir),
@@ -161,7 +159,7 @@ def test_steered_run_is_reproduced_from_its_manifest(tmp_path: Path) -> None:
     ]
 
 
-def test_door_is_shut_from_the_next_step_on(live: LiveRun) -> None:
+def test_door_is_shut_from_the_next_step_on(live):
     walls = live.engine.walls()
     assert "" == live.submit(order("door", "bath_door", value=0))
     live.submit(order("step", value=2))
@@ -178,9 +176,7 @@ def test_door_is_shut_from_the_next_step_on(live: LiveRun) -> None:
         (order("speed", value=-1), "speed"),
     ],
 )
-def test_impossible_order_is_refused_with_a_reason(
-    live: LiveRun, command: LiveOrder, words: str
-) -> None:
+def test_impossible_order_is_refused_with_a_reason(live, command, words):
     assert words in live.submit(command)
 
 
@@ -198,12 +194,12 @@ def test_impossible_order_is_refused_with_a_reason(
         b" " * 5000,
     ],
 )
-def test_what_is_no_order_is_refused(body: bytes) -> None:
+def test_what_is_no_order_is_refused(body):
     with pytest.raises(InputError, match="not a valid order"):
         read_body(body, LIVE_ORDER, "it is not a valid order")
 
 
-def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
+def test_orders_need_the_page_s_origin_and_json(live):
     served = ServedRuns([])
     client = TestClient(page_app(served, "token", PORT, LiveRuns(served, live)), base_url=OWN)
     body = json.dumps(order("step", value=1))
@@ -223,7 +219,7 @@ def test_orders_need_the_page_s_origin_and_json(live: LiveRun) -> None:
     assert 1 == live.engine.simulation.step
 
 
-def test_facts_of_a_run_under_way_name_home_and_bodies(live: LiveRun) -> None:
+def test_facts_of_a_run_under_way_name_home_and_bodies(live):
     served = ServedRuns([])
     client = TestClient(page_app(served, "token", PORT, LiveRuns(served, live)), base_url=OWN)
     facts = client.get("/token/live/0/facts.json").json()

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -21,17 +20,17 @@ AT = 4 * 3600
 
 
 @pytest.fixture
-def parent(run_dir: Path, tmp_path: Path) -> Path:
+def parent(run_dir, tmp_path):
     return Path(shutil.copytree(run_dir, tmp_path / "day"))
 
 
 @pytest.fixture
-def served(parent: Path) -> ServedRuns:
+def served(parent):
     return ServedRuns([parent])
 
 
 @pytest.fixture
-def lives(served: ServedRuns) -> Iterator[LiveRuns]:
+def lives(served):
     lives = LiveRuns(served)
     yield lives
     lives.end_branches()
@@ -43,9 +42,7 @@ def order(action: str, target: str = "", value: float = 0, **more: str) -> LiveO
 
 
 @pytest.mark.slow
-def test_branch_has_the_past_of_its_run_and_a_future_of_its_own(
-    lives: LiveRuns, served: ServedRuns, parent: Path
-) -> None:
+def test_branch_has_the_past_of_its_run_and_a_future_of_its_own(lives, served, parent):
     session = lives.branch(BranchOrder(of="run/0", step=AT))
     assert ("live/0", "day-branch-1", "run/0", AT) == tuple(session.values())
     live = lives._live(0)
@@ -66,7 +63,7 @@ def test_branch_has_the_past_of_its_run_and_a_future_of_its_own(
     assert fleet2d.reproduce(branch.directory).same
 
 
-def test_branch_of_a_running_simulation_keeps_its_interventions(served: ServedRuns) -> None:
+def test_branch_of_a_running_simulation_keeps_its_interventions(served):
     first = LiveRun(
         fleet2d.Simulation("bundled:paper", "simulation.duration=2 h", seed=4), paused=True
     )
@@ -86,7 +83,7 @@ def test_branch_of_a_running_simulation_keeps_its_interventions(served: ServedRu
     assert [first.run.manifest["interventions"]] == [run.manifest["interventions"] for run in twins]
 
 
-def test_run_that_cannot_be_repeated_has_no_branch(parent: Path, lives: LiveRuns) -> None:
+def test_run_that_cannot_be_repeated_has_no_branch(parent, lives):
     manifest = json.loads((parent / "manifest.json").read_text())
     manifest["scenario"]["simulation"]["seed"] += 1
     (parent / "manifest.json").write_text(json.dumps(manifest))
@@ -105,9 +102,7 @@ def test_run_that_cannot_be_repeated_has_no_branch(parent: Path, lives: LiveRuns
         ("../etc", 3, "no running simulation"),
     ],
 )
-def test_impossible_branch_is_refused_with_a_reason(
-    lives: LiveRuns, parent: Path, of: str, step: int, words: str
-) -> None:
+def test_impossible_branch_is_refused_with_a_reason(lives, parent, of, step, words):
     with pytest.raises((InputError, ArtifactError), match=words):
         lives.branch(BranchOrder(of=of, step=step))
     assert [parent] == list(parent.parent.iterdir())
@@ -116,13 +111,13 @@ def test_impossible_branch_is_refused_with_a_reason(
 @pytest.mark.parametrize(
     "body", [b"", b"[]", b'{"of": 3, "step": 4}', b'{"of": "run/0", "step": true}', b" " * 5000]
 )
-def test_what_is_no_branch_is_refused(body: bytes) -> None:
+def test_what_is_no_branch_is_refused(body):
     with pytest.raises(InputError, match="not a valid wish"):
         read_body(body, BRANCH_ORDER, "not a valid wish")
 
 
 @pytest.mark.slow
-def test_branch_needs_the_page_s_origin(lives: LiveRuns, served: ServedRuns) -> None:
+def test_branch_needs_the_page_s_origin(lives, served):
     own = "http://127.0.0.1:8765"
     client = TestClient(page_app(served, "token", 8765, lives), base_url=own)
     body = json.dumps({"of": "run/0", "step": 60})
@@ -136,7 +131,7 @@ def test_branch_needs_the_page_s_origin(lives: LiveRuns, served: ServedRuns) -> 
     ]
 
 
-def test_directories_of_branches_are_numbered(tmp_path: Path) -> None:
+def test_directories_of_branches_are_numbered(tmp_path):
     for name in ("day", "day-branch-1", "day-branch-3"):
         (tmp_path / name).mkdir()
     assert tmp_path / "day-branch-2" == free_directory(tmp_path / "day")

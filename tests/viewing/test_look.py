@@ -14,12 +14,12 @@ SIZES = [
 ]
 
 
-def test_every_symbol_is_of_a_type() -> None:
+def test_every_symbol_is_of_a_type():
     assert symbol_names() - {"glass"} <= set(FURNITURE)
 
 
 @pytest.mark.parametrize(("name", "wide", "deep"), SIZES)
-def test_symbol_is_within_its_piece_at_every_size(name: str, wide: float, deep: float) -> None:
+def test_symbol_is_within_its_piece_at_every_size(name, wide, deep):
     shapes = symbol_of(name, wide, deep)
     assert shapes
     for shape in shapes:
@@ -29,10 +29,10 @@ def test_symbol_is_within_its_piece_at_every_size(name: str, wide: float, deep: 
         assert shape["fill"] or shape["edge"]
 
 
-def test_floors_are_of_types_of_rooms() -> None:
+def test_floors_are_of_types_of_rooms():
     assert {*TILES, *CARPETED} <= set(ROOM_COLORS)
 
 
-def test_activity_is_of_one_kind() -> None:
+def test_activity_is_of_one_kind():
     activities = [each for _, of_kind in ACTIVITIES.values() for each in of_kind]
     assert len(activities) == len(set(activities))

@@ -42,7 +42,7 @@ def steps_of(run: fleet2d.Run, activity: str) -> Sequence[int]:
     return [r["step"] for r in rows if r["event"] == "activity" and r["detail"] == activity]
 
 
-def test_at_night_only_the_room_of_somebody_awake_is_bright() -> None:
+def test_at_night_only_the_room_of_somebody_awake_is_bright():
     run = evening()
     step = 21 * HOUR
 
@@ -53,14 +53,14 @@ def test_at_night_only_the_room_of_somebody_awake_is_bright() -> None:
     assert min(opacity for name, opacity in dark.items() if name not in bright) > 0.4
 
 
-def test_who_sleeps_lies_in_the_dark_and_noon_is_bright_everywhere() -> None:
+def test_who_sleeps_lies_in_the_dark_and_noon_is_bright_everywhere():
     run = evening()
 
     assert min(opacity_of_rooms(run, 2 * HOUR).values()) > 0.4
     assert {0.0} == set(opacity_of_rooms(run, 12 * HOUR).values())
 
 
-def test_a_run_that_switches_lights_is_lit_by_them() -> None:
+def test_a_run_that_switches_lights_is_lit_by_them():
     changes = {
         "extends": "bundled:paper",
         "simulation": {"duration": "22 h", "seed": 4},
@@ -81,8 +81,6 @@ def test_a_run_that_switches_lights_is_lit_by_them() -> None:
 @pytest.mark.parametrize(
     ("hour", "day", "dusk"), [(3, 0, 0), (6, 0.5, 0.5), (12, 1, 0), (19, 0.5, 0.5), (23, 0, 0)]
 )
-def test_the_sky_is_bright_by_day_and_red_when_the_sun_rises_and_sets(
-    hour: int, day: float, dusk: float
-) -> None:
+def test_the_sky_is_bright_by_day_and_red_when_the_sun_rises_and_sets(hour, day, dusk):
     start = datetime(2026, 1, 5)
     assert sky_at([SKY], start.replace(hour=hour), start) == pytest.approx((day, dusk))

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,7 @@ from fleet2d.viewing.notebook import home_png, run_html
 
 
 @pytest.mark.slow
-def test_run_draws_itself_and_its_moments(run_dir: Path) -> None:
+def test_run_draws_itself_and_its_moments(run_dir):
     from matplotlib.figure import Figure
 
     run = fleet2d.open_run(run_dir)
@@ -25,7 +24,7 @@ def test_run_draws_itself_and_its_moments(run_dir: Path) -> None:
 
 
 @pytest.mark.slow
-def test_run_and_home_show_themselves_in_a_notebook(run_dir: Path) -> None:
+def test_run_and_home_show_themselves_in_a_notebook(run_dir):
     run = fleet2d.open_run(run_dir)
     assert str(run.digest)[:12] in run_html(run)
     assert "<img" in run_html(run)
@@ -49,7 +48,7 @@ for shown in ("run", "run.plan", "fleet2d.Home(run.plan)"):
 
 
 @pytest.mark.slow
-def test_cell_of_a_notebook_that_only_imports_fleet2d_shows_runs_and_homes(tmp_path: Path) -> None:
+def test_cell_of_a_notebook_that_only_imports_fleet2d_shows_runs_and_homes(tmp_path):
     pytest.importorskip("IPython", reason="IPython is not installed")
     command = [sys.executable, "-c", NOTEBOOK]
     environment = {**os.environ, "IPYTHONDIR": str(tmp_path)}
@@ -61,7 +60,7 @@ def test_cell_of_a_notebook_that_only_imports_fleet2d_shows_runs_and_homes(tmp_p
 
 
 @pytest.mark.slow
-def test_violated_expectation_comes_before_the_facts_of_a_run_and_notes_are_calm() -> None:
+def test_violated_expectation_comes_before_the_facts_of_a_run_and_notes_are_calm():
     changes = ("simulation.duration=1 min", "expect.still=never(moving(astro))")
     run = fleet2d.run("bundled:paper", *changes, "expect.any=always(distance(ana, astro) > 0 m)")
     run.notes.append("a remark")
@@ -77,20 +76,20 @@ def test_violated_expectation_comes_before_the_facts_of_a_run_and_notes_are_calm
     assert "\u2717 the run failed; 2 expectations: 2 held" in run_html(run)
 
 
-def test_run_is_a_widget(run_dir: Path) -> None:
+def test_run_is_a_widget(run_dir):
     pytest.importorskip("anywidget", reason="anywidget is not installed")
     widget = fleet2d.view(fleet2d.open_run(run_dir), height=400)
     assert 400 == widget.height
     assert "fleet2d-runs" in widget.content
 
 
-def test_run_shows_itself_in_marimo(run_dir: Path) -> None:
+def test_run_shows_itself_in_marimo(run_dir):
     marimo = pytest.importorskip("marimo", reason="marimo is not installed")
     run = fleet2d.open_run(run_dir)
     assert "<marimo-anywidget" in marimo.as_html(fleet2d.view(run)).text
 
 
-def test_missing_library_is_named(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_library_is_named(run_dir, monkeypatch):
     run = fleet2d.open_run(run_dir)
     for name in [name for name in sys.modules if name.startswith("fleet2d.viewing.pictures")]:
         monkeypatch.delitem(sys.modules, name)

@@ -27,7 +27,7 @@ def runs_in(path: Path) -> list[dict[str, Any]]:
     return runs
 
 
-def test_file_holds_the_run_and_loads_nothing(run_dir: Path, tmp_path: Path) -> None:
+def test_file_holds_the_run_and_loads_nothing(run_dir, tmp_path):
     target = tmp_path / "run.html"
     export_html(fleet2d.open_run(run_dir), target)
     (embedded,) = runs_in(target)
@@ -40,7 +40,7 @@ def test_file_holds_the_run_and_loads_nothing(run_dir: Path, tmp_path: Path) -> 
     assert "default-src 'none'" in outside
 
 
-def test_first_picture_waits_for_no_pandas(run_dir: Path) -> None:
+def test_first_picture_waits_for_no_pandas(run_dir):
     # Importing it takes longer than all else that a month's first picture needs of the server.
     work = f"""
 import sys
@@ -55,7 +55,7 @@ print("pandas" in sys.modules)
     assert "False" == ended.stdout.strip()
 
 
-def test_decisions_that_were_not_stored_are_those_of_the_run(run_dir: Path) -> None:
+def test_decisions_that_were_not_stored_are_those_of_the_run(run_dir):
     run = fleet2d.open_run(run_dir)
     data = PageData(run)
     table = pq.read_table(data.table_path("decisions")).to_pylist()
@@ -67,7 +67,7 @@ def test_decisions_that_were_not_stored_are_those_of_the_run(run_dir: Path) -> N
     assert all(f"explores {row['detail']}" == decided[row["step"]] for row in explores)
 
 
-def test_part_of_a_run_keeps_poses_within_it_and_drops_the_rest(run_dir: Path) -> None:
+def test_part_of_a_run_keeps_poses_within_it_and_drops_the_rest(run_dir):
     data = PageData(fleet2d.open_run(run_dir))
     complete, part = embedded_run(data, 0, 9 * 3600), embedded_run(data, 3600, 7200)
     assert (3600, 7200) == (part["facts"]["first_step"], part["facts"]["end_step"])
@@ -80,24 +80,24 @@ def test_part_of_a_run_keeps_poses_within_it_and_drops_the_rest(run_dir: Path) -
         assert min(steps) <= 3600
 
 
-def test_text_of_a_run_can_not_end_its_element(run_dir: Path) -> None:
+def test_text_of_a_run_can_not_end_its_element(run_dir):
     embedded = embedded_run(PageData(fleet2d.open_run(run_dir)), 0, 3600)
     embedded["facts"]["title"] = "</script><script>alert(1)</script>"
     assert "<script>alert" not in html_of([embedded])
 
 
 @pytest.mark.parametrize(("first", "end"), [(5, 5), (-1, 9), (0, 10**9)])
-def test_empty_part_is_refused(run_dir: Path, tmp_path: Path, first: int, end: int) -> None:
+def test_empty_part_is_refused(run_dir, tmp_path, first, end):
     with pytest.raises(InputError, match="nothing to show"):
         export_html(fleet2d.open_run(run_dir), tmp_path / "x.html", first, end)
 
 
-def test_file_that_can_not_be_written_is_an_input_error(run_dir: Path, tmp_path: Path) -> None:
+def test_file_that_can_not_be_written_is_an_input_error(run_dir, tmp_path):
     with pytest.raises(InputError, match="can't be written"):
         export_html(fleet2d.open_run(run_dir), tmp_path / "no" / "x.html")
 
 
-def test_tracks_are_the_key_frames_body_by_body(run_dir: Path) -> None:
+def test_tracks_are_the_key_frames_body_by_body(run_dir):
     run = fleet2d.open_run(run_dir)
     data, frames = PageData(run), run.tables["key_frames"].to_pylist()
     bodies = [*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]]

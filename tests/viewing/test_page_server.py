@@ -4,7 +4,6 @@ import io
 import json
 import shutil
 import socket
-from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path
 
@@ -26,13 +25,13 @@ FACTS = f"/{TOKEN}/run/0/facts.json"
 
 
 @pytest.fixture
-def client(run_dir: Path) -> Iterator[TestClient]:
+def client(run_dir):
     app = page_app(ServedRuns([run_dir]), TOKEN, PORT)
     with TestClient(app, base_url=OWN) as client:
         yield client
 
 
-def test_own_page_is_answered(client: TestClient) -> None:
+def test_own_page_is_answered(client):
     answer = client.get(FACTS, headers={"Origin": OWN, "Sec-Fetch-Site": "same-origin"})
     assert 200 == answer.status_code
     assert "first" == answer.json()["title"]
@@ -41,7 +40,7 @@ def test_own_page_is_answered(client: TestClient) -> None:
 @pytest.mark.parametrize(
     "path", ["/", "/session.json", f"/{TOKEN[:-1]}/session.json", "/x/page.js"]
 )
-def test_address_without_the_token_is_refused(client: TestClient, path: str) -> None:
+def test_address_without_the_token_is_refused(client, path):
     answer = client.get(path)
     assert 403 == answer.status_code
     assert "token" in answer.json()["message"]
@@ -50,25 +49,23 @@ def test_address_without_the_token_is_refused(client: TestClient, path: str) -> 
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:8765", "127.0.0.1:80", "127.0.0.1", ""]
 )
-def test_other_name_for_this_machine_is_refused(client: TestClient, host: str) -> None:
+def test_other_name_for_this_machine_is_refused(client, host):
     assert 403 == client.get(FACTS, headers={"Host": host}).status_code
 
 
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "null", "http://127.0.0.1:80", "https://127.0.0.1:8765"]
 )
-def test_other_page_is_refused_even_with_the_token(client: TestClient, origin: str) -> None:
+def test_other_page_is_refused_even_with_the_token(client, origin):
     assert 403 == client.get(FACTS, headers={"Origin": origin}).status_code
 
 
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
-def test_request_that_a_browser_marks_as_of_another_site_is_refused(
-    client: TestClient, site: str
-) -> None:
+def test_request_that_a_browser_marks_as_of_another_site_is_refused(client, site):
     assert 403 == client.get(FACTS, headers={"Sec-Fetch-Site": site}).status_code
 
 
-def test_change_that_names_no_origin_is_refused(client: TestClient) -> None:
+def test_change_that_names_no_origin_is_refused(client):
     assert 403 == client.post(f"/{TOKEN}/live/0/order", json={}).status_code
 
 
@@ -88,11 +85,11 @@ def test_change_that_names_no_origin_is_refused(client: TestClient) -> None:
         "run/0/walls/9999.json",
     ],
 )
-def test_nothing_outside_the_runs_is_served(client: TestClient, path: str) -> None:
+def test_nothing_outside_the_runs_is_served(client, path):
     assert client.get(f"/{TOKEN}/{path}").status_code in (404, 422)
 
 
-def test_every_answer_has_a_strict_policy(client: TestClient) -> None:
+def test_every_answer_has_a_strict_policy(client):
     for path in (f"/{TOKEN}/", FACTS, "/", f"/{TOKEN}/nothing"):
         headers = client.get(path).headers
         assert "default-src 'none'" in headers["content-security-policy"]
@@ -102,14 +99,14 @@ def test_every_answer_has_a_strict_policy(client: TestClient) -> None:
         assert "access-control-allow-origin" not in headers
 
 
-def test_server_listens_on_the_loopback_only(run_dir: Path) -> None:
+def test_server_listens_on_the_loopback_only(run_dir):
     server = PageServer([run_dir])
     assert "127.0.0.1" == server.listens_at[0]
     assert server.address.startswith("http://127.0.0.1:")
     server.close()
 
 
-def test_browser_that_comes_before_the_server_runs_is_not_refused(run_dir: Path) -> None:
+def test_browser_that_comes_before_the_server_runs_is_not_refused(run_dir):
     server = PageServer([run_dir])
     try:
         socket.create_connection(server.listens_at, timeout=10).close()
@@ -117,7 +114,7 @@ def test_browser_that_comes_before_the_server_runs_is_not_refused(run_dir: Path)
         server.close()
 
 
-def test_tokens_differ_and_are_long() -> None:
+def test_tokens_differ_and_are_long():
     tokens = {new_token() for _ in range(100)}
     assert 100 == len(tokens)
     assert min(map(len, tokens)) >= 32
@@ -131,26 +128,26 @@ def client_of(*sources: Path | PageData) -> TestClient:
 
 
 @pytest.fixture
-def copy(run_dir: Path, tmp_path: Path) -> Path:
+def copy(run_dir, tmp_path):
     target = tmp_path / "copy"
     shutil.copytree(run_dir, target)
     return target
 
 
-def test_page_and_its_parts_are_served(run_dir: Path) -> None:
+def test_page_and_its_parts_are_served(run_dir):
     client = client_of(run_dir)
     assert '<div id="page">' in client.get("").text
     assert client.get("page.js").headers["content-type"].startswith("text/javascript")
     assert client.get("page.css").headers["content-type"].startswith("text/css")
 
 
-def test_session_names_all_runs(run_dir: Path, other_dir: Path) -> None:
+def test_session_names_all_runs(run_dir, other_dir):
     session = client_of(run_dir, other_dir).get("session.json").json()
     assert ["first", "second"] == session["runs"]
     assert not session["live"]
 
 
-def test_facts_are_those_of_the_run(run_dir: Path) -> None:
+def test_facts_are_those_of_the_run(run_dir):
     facts = client_of(run_dir).get("run/0/facts.json").json()
     run = fleet2d.open_run(run_dir)
     assert run.digest == facts["digest"]
@@ -165,13 +162,13 @@ def test_facts_are_those_of_the_run(run_dir: Path) -> None:
     )  # fmt: skip
 
 
-def test_part_of_a_table_is_served_by_range(run_dir: Path) -> None:
+def test_part_of_a_table_is_served_by_range(run_dir):
     answer = client_of(run_dir).get("run/0/tables/events.parquet", headers={"Range": "bytes=0-3"})
     assert 206 == answer.status_code
     assert b"PAR1" == answer.content
 
 
-def test_walls_change_when_a_door_moves(run_dir: Path) -> None:
+def test_walls_change_when_a_door_moves(run_dir):
     data = PageData(fleet2d.open_run(run_dir))
     changes = data.facts["walls"]
     assert len(changes) > 3
@@ -182,7 +179,7 @@ def test_walls_change_when_a_door_moves(run_dir: Path) -> None:
     assert len(set(walls)) > 1
 
 
-def test_sightings_cover_the_observations(run_dir: Path) -> None:
+def test_sightings_cover_the_observations(run_dir):
     run = fleet2d.open_run(run_dir)
     lane = PageData(run).sightings[0]
     steps = run.tables["observations"]["step"].to_pylist()
@@ -193,7 +190,7 @@ def test_sightings_cover_the_observations(run_dir: Path) -> None:
     assert not any(lane["false"])
 
 
-def test_false_sightings_are_marked() -> None:
+def test_false_sightings_are_marked():
     run = fleet2d.run(
         "bundled:paper",
         "simulation.duration=6 h",
@@ -204,14 +201,14 @@ def test_false_sightings_are_marked() -> None:
     assert any(any(lane["false"]) for lane in lanes)
 
 
-def test_run_in_memory_is_served_like_a_stored_one() -> None:
+def test_run_in_memory_is_served_like_a_stored_one():
     run = fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=3)
     client = client_of(PageData(run))
     assert "paper" == client.get("run/0/facts.json").json()["title"]
     assert b"PAR1" == client.get("run/0/tables/key_frames.parquet").content[:4]
 
 
-def test_random_walks_are_sent_as_positions(tmp_path: Path) -> None:
+def test_random_walks_are_sent_as_positions(tmp_path):
     run = fleet2d.run(
         {
             "simulation": {"duration": "1 h", "start": "2026-01-05", "seed": 1},
@@ -234,9 +231,7 @@ def test_random_walks_are_sent_as_positions(tmp_path: Path) -> None:
         ("floorplan.json", b"[]", "floorplan.json"),
     ],
 )
-def test_damaged_run_is_refused_with_a_message(
-    copy: Path, file: str, content: bytes | None, words: str
-) -> None:
+def test_damaged_run_is_refused_with_a_message(copy, file, content, words):
     path = copy / file
     if content is None:
         path.unlink()
@@ -247,14 +242,14 @@ def test_damaged_run_is_refused_with_a_message(
     assert words in answer.json()["message"]
 
 
-def test_damaged_table_is_noted_and_the_rest_shown(copy: Path) -> None:
+def test_damaged_table_is_noted_and_the_rest_shown(copy):
     (copy / "events.parquet").write_bytes(b"PAR1")
     answer = client_of(copy).get("run/0/facts.json")
     assert 200 == answer.status_code
     assert any("events" in note for note in answer.json()["notes"])
 
 
-def test_unfinished_run_is_shown_as_far_as_it_goes(copy: Path) -> None:
+def test_unfinished_run_is_shown_as_far_as_it_goes(copy):
     manifest = json.loads((copy / "manifest.json").read_text())
     manifest |= {"status": "running", "digest": None, "tables": {}}
     (copy / "manifest.json").write_text(json.dumps(manifest))
@@ -266,7 +261,7 @@ def test_unfinished_run_is_shown_as_far_as_it_goes(copy: Path) -> None:
     assert [] != next(t for t in facts["tables"] if t["name"] == "events")["columns"]
 
 
-def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path: Path) -> None:
+def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path):
     out = tmp_path / "cut"
     simulation = fleet2d.Simulation(
         "bundled:paper", "simulation.duration=6 h", "artifacts.checkpoint=1 h", seed=4, out=out
@@ -287,20 +282,20 @@ def test_tables_of_a_run_that_was_cut_off_are_served_from_its_journal(tmp_path: 
 
 
 @pytest.fixture
-def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def state(tmp_path, monkeypatch):
     """The state folder of a user."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     return tmp_path / "state" / "fleet2d" / "view-token"
 
 
-def test_a_link_stays_valid_as_the_token_is_kept_where_only_the_user_reads_it(state: Path) -> None:
+def test_a_link_stays_valid_as_the_token_is_kept_where_only_the_user_reads_it(state):
     """A link to a moment was dead as soon as `fleet2d view` was started again."""
     assert kept_token() == kept_token() == state.read_text()
     assert state.stat().st_mode & 0o777 == 0o600
 
 
 @pytest.mark.parametrize("damage", ["others read it", "short", "link", "folder is a file"])
-def test_a_kept_token_that_cannot_be_trusted_is_not_used(state: Path, damage: str) -> None:
+def test_a_kept_token_that_cannot_be_trusted_is_not_used(state, damage):
     if damage == "folder is a file":
         state.parent.parent.write_text("")
     else:
@@ -318,9 +313,7 @@ def test_a_kept_token_that_cannot_be_trusted_is_not_used(state: Path, damage: st
     assert len(kept_token()) >= 32
 
 
-def test_a_page_behind_a_tunnel_or_proxy_answers_under_the_stated_address_only(
-    run_dir: Path,
-) -> None:
+def test_a_page_behind_a_tunnel_or_proxy_answers_under_the_stated_address_only(run_dir):
     app = page_app(ServedRuns([run_dir]), "token", PORT, seen_at="https://robots.example/fleet2d")
     at = {url: TestClient(app, base_url=url) for url in ("https://robots.example", "http://evil")}
     assert at["https://robots.example"].get("/token/session.json").status_code == 200
@@ -329,15 +322,13 @@ def test_a_page_behind_a_tunnel_or_proxy_answers_under_the_stated_address_only(
     assert "--seen-at" in refused.json()["message"]
 
 
-def test_what_is_no_address_of_a_proxy_is_refused(run_dir: Path) -> None:
+def test_what_is_no_address_of_a_proxy_is_refused(run_dir):
     with pytest.raises(InputError, match="http://localhost:9000"):
         PageServer([run_dir], seen_at="localhost:9000")
 
 
 @pytest.mark.parametrize(("opens", "said"), [(True, False), (False, True)])
-def test_no_browser_is_said_with_what_helps(
-    opens: bool, said: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_browser_is_said_with_what_helps(opens, said, monkeypatch):
     monkeypatch.setattr(page_server.webbrowser, "open", lambda _: opens)
     monkeypatch.setattr(PageServer, "run", lambda _: None)
     lines: list[str] = []

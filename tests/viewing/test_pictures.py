@@ -6,7 +6,6 @@ views with `FLEET2D_THOROUGH=1`: look at each before it is committed.
 
 import io
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +37,7 @@ ORDINARY = [("now", "light"), ("beliefs", "dark")]
 
 
 @pytest.fixture(scope="module")
-def addresses(run_dir: Path, other_dir: Path) -> Iterator[dict[str, str]]:
+def addresses(run_dir, other_dir):
     servers = {"two": PageServer([run_dir, other_dir]), "": PageServer([run_dir])}
     stops = [server.start() for server in servers.values()]
     yield {name: server.address for name, server in servers.items()}
@@ -64,9 +63,7 @@ def picture_of(page: Any) -> np.ndarray:
         if THOROUGH or (view, scheme) in ORDINARY
     ],
 )
-def test_view_looks_as_before(
-    browser: Any, addresses: dict[str, str], view: str, scheme: str
-) -> None:
+def test_view_looks_as_before(browser, addresses, view, scheme):
     address = addresses.get(view, addresses[""]) + VIEWS[view]
     with page_at(browser, address, color_scheme=scheme, viewport=SIZE) as page:
         page.wait_for_timeout(1200)

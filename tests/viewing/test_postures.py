@@ -2,7 +2,6 @@
 
 from collections import Counter
 from datetime import datetime
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,7 +21,7 @@ WIDE = {"angle_deg": 360, "range": [0, 9], "detection": 1}
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def run(tmp_path_factory):
     """A run whose cameras recorded the true postures of whom they saw."""
     scenario = {
         "extends": "bundled:family",
@@ -33,7 +32,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @pytest.mark.slow
-def test_postures_are_the_true_ones_wherever_there_is_furniture_for_them(run: Any) -> None:
+def test_postures_are_the_true_ones_wherever_there_is_furniture_for_them(run):
     postures = Postures(run, run.plan)
     step_us = run.manifest["step_us"]
     rests = np.array(
@@ -54,7 +53,7 @@ def test_postures_are_the_true_ones_wherever_there_is_furniture_for_them(run: An
 
 
 @pytest.mark.slow
-def test_postures_are_in_order_and_within_the_run(run: Any) -> None:
+def test_postures_are_in_order_and_within_the_run(run):
     table = postures_of(run, run.plan)
     end = run.manifest["steps"] * run.manifest["step_us"]
     last: dict[str, int] = {}
@@ -65,7 +64,7 @@ def test_postures_are_in_order_and_within_the_run(run: Any) -> None:
     assert set(last) == set(run.manifest["entities"]["users"])
 
 
-def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then() -> None:
+def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then():
     rows = [(0, 0, "track", 2.0), (60, 60, "track", 2.0), (65, 90, "planned", 8.0), (65, 65, "track", 3.0)]  # fmt: skip
     step, at_s, kind, x = zip(*rows, strict=True)
     start = np.datetime64("2026-01-05", "us")
@@ -88,7 +87,7 @@ def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then() -> None
     )
 
 
-def test_people_sit_at_the_same_steps_in_a_home_with_a_time_zone(tmp_path: Path) -> None:
+def test_people_sit_at_the_same_steps_in_a_home_with_a_time_zone(tmp_path):
     simulation = {**HOME["simulation"], "duration": "9 h"}
     here = fleet2d.run({**FURNISHED, **PEOPLE, "simulation": simulation}, out=tmp_path / "here")
     zoned = {**simulation, "time_zone": "Europe/Berlin"}
@@ -109,9 +108,7 @@ def test_people_sit_at_the_same_steps_in_a_home_with_a_time_zone(tmp_path: Path)
     ],
     ids=["no furniture", "nobody", "no key frames"],
 )
-def test_without_furniture_people_or_key_frames_nobody_sits(
-    scenario: dict[str, Any], tmp_path: Path
-) -> None:
+def test_without_furniture_people_or_key_frames_nobody_sits(scenario, tmp_path):
     scenario["simulation"] = {**HOME["simulation"], "duration": "10 min"}
     run = fleet2d.run(scenario, out=tmp_path / "run")
     table: pa.Table = postures_of(run, run.plan)

@@ -4,7 +4,6 @@ import itertools
 import json
 import math
 from datetime import datetime
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -28,7 +27,7 @@ STEPS = 1000
 
 
 @given(st.lists(st.tuples(st.integers(0, STEPS - 1), st.integers(0, 50)), max_size=8))
-def test_stretches_of_an_expectation_tile_the_run(starts: list[tuple[int, int]]) -> None:
+def test_stretches_of_an_expectation_tile_the_run(starts):
     violations = sorted((first, min(STEPS - 1, first + length)) for first, length in starts)
     marks = expectation_marks("quiet", {"holds": not violations}, violations, STEPS)
     assert 0 == marks[0]["step"]
@@ -52,14 +51,12 @@ def test_stretches_of_an_expectation_tile_the_run(starts: list[tuple[int, int]])
         ({"holds": None, "decided": True}, "open"),
     ],
 )
-def test_expectation_without_violations_is_what_its_verdict_says(
-    verdict: dict[str, bool | None], kind: str
-) -> None:
+def test_expectation_without_violations_is_what_its_verdict_says(verdict, kind):
     (mark,) = expectation_marks("found", verdict, [], STEPS)
     assert (0, STEPS, kind) == (mark["step"], mark["end"], mark["kind"])
 
 
-def test_marks_come_from_manifest_and_table() -> None:
+def test_marks_come_from_manifest_and_table():
     import pyarrow as pa
 
     run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
@@ -78,7 +75,7 @@ def test_marks_come_from_manifest_and_table() -> None:
     ]
 
 
-def test_interventions_of_a_script_say_so() -> None:
+def test_interventions_of_a_script_say_so():
     (mark,) = intervention_marks([{"do": "shut", "step": 7, "door": "bath_door", "by": "script.0"}])
     assert ("interventions", 7, 8, "shut bath_door (script.0)") == (
         mark["lane"],
@@ -88,7 +85,7 @@ def test_interventions_of_a_script_say_so() -> None:
     )
 
 
-def test_slow_floors_last_as_long_as_they_were_put() -> None:
+def test_slow_floors_last_as_long_as_they_were_put():
     clock = Clock(datetime(2026, 1, 5), 1_000_000, 3600)
     area = [[1.0, 1.0], [3.0, 1.0], [3.0, 3.0]]
     scenario = {"floorplan": {"slows": [{"area": area, "stop": "2 s"}]}}
@@ -104,9 +101,7 @@ def test_slow_floors_last_as_long_as_they_were_put() -> None:
     ] == [(f["step"], f["end"], f["words"]) for f in slow_floors(scenario, records, clock)]
 
 
-def test_sightings_are_the_same_however_they_are_read(
-    run_dir: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_sightings_are_the_same_however_they_are_read(run_dir, monkeypatch):
     whole = sightings_of(fleet2d.open_run(run_dir))
     monkeypatch.setattr(run_facts, "BATCH_ROWS", 7)
     assert whole == sightings_of(fleet2d.open_run(run_dir))
@@ -116,7 +111,7 @@ def test_sightings_are_the_same_however_they_are_read(
     assert sum(len(lane["first"]) for lane in whole) > 5
 
 
-def test_light_of_each_day_is_that_of_the_sun_over_the_home() -> None:
+def test_light_of_each_day_is_that_of_the_sun_over_the_home():
     scenario = {"simulation": {"daylight": {"latitude": 52.5}}}
 
     winter, _ = skies_of(scenario, Clock(datetime(2026, 12, 21, 14), 3_600_000_000, 12))
@@ -126,13 +121,13 @@ def test_light_of_each_day_is_that_of_the_sun_over_the_home() -> None:
     assert summer == pytest.approx((3.1, 4.1, 19.9, 20.9), abs=0.2)
 
 
-def test_light_is_as_cameras_have_it_where_the_scenario_has_no_daylight() -> None:
+def test_light_is_as_cameras_have_it_where_the_scenario_has_no_daylight():
     clock = Clock(datetime(2026, 1, 5), 1_000_000, 60)
 
     assert [(6.0, 8.0, 17.0, 19.0)] == skies_of({"simulation": {"daylight": None}}, clock)
 
 
-def test_results_of_metrics_that_are_no_numbers_reach_the_page() -> None:
+def test_results_of_metrics_that_are_no_numbers_reach_the_page():
     run = fleet2d.run("bundled:paper", "simulation.duration=10 min")
     run.manifest["metrics"]["odd"] = {"error": math.nan, "parts": {"none": None, "text": "late"}}
     metrics = json.loads(PageData(run).facts_json)["metrics"]

@@ -19,7 +19,7 @@ from fleet2d.viewing.served_runs import ServedRuns
 OWN = "http://127.0.0.1:8765"
 
 
-def test_notes_are_kept_beside_the_run_and_not_in_it(run_dir: Path, tmp_path: Path) -> None:
+def test_notes_are_kept_beside_the_run_and_not_in_it(run_dir, tmp_path):
     root = Path(shutil.copytree(run_dir, tmp_path / "day"))
     client = TestClient(page_app(ServedRuns([root]), "token", 8765), base_url=f"{OWN}/token/")
     headers = {"Origin": OWN, "Content-Type": "application/json"}
@@ -50,19 +50,19 @@ def test_notes_are_kept_beside_the_run_and_not_in_it(run_dir: Path, tmp_path: Pa
         b"[" * 100_000,
     ],
 )
-def test_what_are_no_notes_is_refused(body: bytes) -> None:
+def test_what_are_no_notes_is_refused(body):
     with pytest.raises(InputError, match="notes are"):
         checked_notes(body)
 
 
-def test_run_in_memory_has_no_notes_and_says_why() -> None:
+def test_run_in_memory_has_no_notes_and_says_why():
     run = fleet2d.run("bundled:paper", "simulation.duration=10 min", seed=4)
     assert [] == read_notes(PageData(run).run)
     with pytest.raises(InputError, match="in memory"):
         write_notes(run, b"[]")
 
 
-def test_damaged_file_of_notes_is_named(run_dir: Path, tmp_path: Path) -> None:
+def test_damaged_file_of_notes_is_named(run_dir, tmp_path):
     root = Path(shutil.copytree(run_dir, tmp_path / "day"))
     (tmp_path / "day.notes.json").write_text("{")
     with pytest.raises(InputError, match=r"day\.notes\.json can't be read"):
@@ -70,9 +70,7 @@ def test_damaged_file_of_notes_is_named(run_dir: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link"])
-def test_a_pipe_or_a_link_in_place_of_notes_is_refused_by_the_page(
-    run_dir: Path, tmp_path: Path, kind: str
-) -> None:
+def test_a_pipe_or_a_link_in_place_of_notes_is_refused_by_the_page(run_dir, tmp_path, kind):
     """The request for notes waited for the pipe for ever."""
     root = Path(shutil.copytree(run_dir, tmp_path / "day"))
     (tmp_path / "secret.json").write_text('[{"step": 1, "text": "secret"}]')

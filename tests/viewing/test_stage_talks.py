@@ -27,14 +27,14 @@ def run_with(outcomes: tuple[str, ...], **changes: Any) -> fleet2d.Run:
         ("banned", "sent away"),
     ],
 )
-def test_a_question_is_drawn_by_its_answer(outcome: str, answer: str) -> None:
+def test_a_question_is_drawn_by_its_answer(outcome, answer):
     (asked, *_) = asked_of(run_with((outcome,)))
 
     assert ("astro", "pill ana", answer) == (asked.robot, asked.text, asked.answer)
     assert 600 <= asked.step < 1800
 
 
-def test_a_question_lasts_until_it_is_carried_out_or_the_robot_withdraws() -> None:
+def test_a_question_lasts_until_it_is_carried_out_or_the_robot_withdraws():
     for outcome, takes in (("accepted", 30), ("", 0)):
         run = run_with((outcome,))
         (talk, *_) = asked_of(run)
@@ -47,7 +47,7 @@ def test_a_question_lasts_until_it_is_carried_out_or_the_robot_withdraws() -> No
             assert talk.end - talk.step == pytest.approx(20, abs=2)  # its patience
 
 
-def test_a_film_says_what_is_asked_and_answered_beside_the_robot() -> None:
+def test_a_film_says_what_is_asked_and_answered_beside_the_robot():
     run = run_with(("accepted",))
     (talk, *_) = asked_of(run)
     stage = Stage(run, talk.step - 60, talk.step + 120, figure=Figure())

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -37,7 +36,7 @@ STATES: dict[str, tuple[dict[str, Any], str, str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STATES)
-def test_odd_run_or_link_says_what_is(browser: Any, tmp_path: Path, name: str) -> None:
+def test_odd_run_or_link_says_what_is(browser, tmp_path, name):
     scenario, link, words = STATES[name]
     fleet2d.run(scenario, out=tmp_path / "run")
     with served(tmp_path / "run") as address, page_at(browser, address + link) as page:
@@ -49,7 +48,7 @@ def test_odd_run_or_link_says_what_is(browser: Any, tmp_path: Path, name: str) -
 
 
 @pytest.mark.slow
-def test_run_that_starts_at_any_minute_keeps_its_clock(browser: Any, tmp_path: Path) -> None:
+def test_run_that_starts_at_any_minute_keeps_its_clock(browser, tmp_path):
     fleet2d.run({**PAPER, "simulation": LATE}, out=tmp_path / "run")
     with served(tmp_path / "run") as address, page_at(browser, f"{address}#view=calendar") as page:
         assert shown_clock(page).startswith("14:37:00Mon 5 Jan")
@@ -62,7 +61,7 @@ def test_run_that_starts_at_any_minute_keeps_its_clock(browser: Any, tmp_path: P
 
 
 @pytest.mark.slow
-def test_ten_robots_on_one_spot_are_ten(browser: Any, tmp_path: Path) -> None:
+def test_ten_robots_on_one_spot_are_ten(browser, tmp_path):
     simulation = {**START, "duration": "8 h", "ghosts": True}
     fleet2d.run({**HOME, "simulation": simulation, "robots": TEN}, out=tmp_path / "run")
     at = "#at=2026-01-05T07:00:00"
@@ -80,7 +79,7 @@ def test_ten_robots_on_one_spot_are_ten(browser: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_stopped_server_is_told_and_what_was_read_stays(browser: Any, run_dir: Path) -> None:
+def test_stopped_server_is_told_and_what_was_read_stays(browser, run_dir):
     server = PageServer([run_dir])
     stop = server.start()
     with page_at(browser, server.address) as page:
@@ -92,7 +91,7 @@ def test_stopped_server_is_told_and_what_was_read_stays(browser: Any, run_dir: P
 
 
 @pytest.mark.slow
-def test_deleted_run_is_told(browser: Any, run_dir: Path, tmp_path: Path) -> None:
+def test_deleted_run_is_told(browser, run_dir, tmp_path):
     copy = shutil.copytree(run_dir, tmp_path / "copy")
     server = PageServer([copy])
     stop = server.start()
@@ -102,7 +101,7 @@ def test_deleted_run_is_told(browser: Any, run_dir: Path, tmp_path: Path) -> Non
     stop()
 
 
-def test_old_link_shows_a_page_that_says_what_to_do(run_dir: Path) -> None:
+def test_old_link_shows_a_page_that_says_what_to_do(run_dir):
     server = PageServer([run_dir])
     stop = server.start()
     host, port = server.listens_at
@@ -116,7 +115,7 @@ def test_old_link_shows_a_page_that_says_what_to_do(run_dir: Path) -> None:
 
 
 @pytest.mark.slow
-def test_palette_asks_goes_and_does(browser: Any, run_dir: Path) -> None:
+def test_palette_asks_goes_and_does(browser, run_dir):
     with served(run_dir) as address, page_at(browser, address) as page:
         page.keyboard.press("Control+k")
         page.keyboard.type("how often was ana in the bathroom")
@@ -145,7 +144,7 @@ def test_palette_asks_goes_and_does(browser: Any, run_dir: Path) -> None:
 
 
 @pytest.mark.slow
-def test_link_keeps_question_marked_range_and_pinned_lanes(browser: Any, run_dir: Path) -> None:
+def test_link_keeps_question_marked_range_and_pinned_lanes(browser, run_dir):
     with served(run_dir) as address, page_at(browser, address) as page:
         page.fill("#ask", "ana in bathroom")
         page.press("#ask", "Enter")
@@ -171,8 +170,8 @@ def test_link_keeps_question_marked_range_and_pinned_lanes(browser: Any, run_dir
 @pytest.mark.slow
 @pytest.mark.parametrize(("key", "endings"), [("s", ("png",)), ("w", ("webm", "mp4"))])
 def test_view_is_stored_by_one_key_in_a_file_without_a_server(
-    browser: Any, run_dir: Path, tmp_path: Path, key: str, endings: tuple[str, ...]
-) -> None:
+    browser, run_dir, tmp_path, key, endings
+):
     export_html(fleet2d.open_run(run_dir), tmp_path / "run.html")
     link = f"{(tmp_path / 'run.html').as_uri()}#view=lanes&at=2026-01-05T07:00:00"
     with page_at(browser, link) as page:
@@ -186,7 +185,7 @@ def test_view_is_stored_by_one_key_in_a_file_without_a_server(
 
 
 @pytest.mark.slow
-def test_reel_plays_every_card_and_a_key_ends_it(browser: Any, run_dir: Path) -> None:
+def test_reel_plays_every_card_and_a_key_ends_it(browser, run_dir):
     with served(run_dir) as address, page_at(browser, address) as page:
         titles = [
             card["title"]
@@ -201,7 +200,7 @@ def test_reel_plays_every_card_and_a_key_ends_it(browser: Any, run_dir: Path) ->
 
 
 @pytest.mark.slow
-def test_popovers_are_inside_the_window(browser: Any, run_dir: Path) -> None:
+def test_popovers_are_inside_the_window(browser, run_dir):
     small = {"viewport": {"width": 900, "height": 480}}
     with served(run_dir) as address, page_at(browser, f"{address}#view=calendar", **small) as page:
         box = page.locator(".days").bounding_box()
@@ -223,7 +222,7 @@ def is_inside(page: Any, selector: str) -> bool:
 
 
 @pytest.mark.slow
-def test_zoomed_plan_has_a_button_to_the_whole(browser: Any, run_dir: Path) -> None:
+def test_zoomed_plan_has_a_button_to_the_whole(browser, run_dir):
     with served(run_dir) as address, page_at(browser, address) as page:
         assert 0 == page.locator("button.fit").count()
         box = page.locator(".plan canvas.top").bounding_box()
@@ -235,9 +234,7 @@ def test_zoomed_plan_has_a_button_to_the_whole(browser: Any, run_dir: Path) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("view", ["calendar", "lanes"])
-def test_print_shows_plan_and_timeline_and_nothing_to_press(
-    browser: Any, run_dir: Path, view: str
-) -> None:
+def test_print_shows_plan_and_timeline_and_nothing_to_press(browser, run_dir, view):
     link = f"#view={view}&at=2026-01-05T07:30:00"
     with served(run_dir) as address, page_at(browser, address + link) as page:
         page.emulate_media(media="print")
@@ -260,9 +257,7 @@ PIXELS = """() => [...document.querySelectorAll(".plan canvas")].map((canvas) =>
 
 
 @pytest.mark.slow
-def test_file_and_cell_of_a_notebook_look_as_the_served_page(
-    browser: Any, run_dir: Path, tmp_path: Path
-) -> None:
+def test_file_and_cell_of_a_notebook_look_as_the_served_page(browser, run_dir, tmp_path):
     run = fleet2d.open_run(run_dir)
     target = tmp_path / "run.html"
     export_html(run, target)
@@ -290,7 +285,7 @@ def test_file_and_cell_of_a_notebook_look_as_the_served_page(
 
 
 @pytest.mark.slow
-def test_click_on_a_plan_inspects_that_plan(browser: Any, run_dir: Path, other_dir: Path) -> None:
+def test_click_on_a_plan_inspects_that_plan(browser, run_dir, other_dir):
     with served(run_dir, other_dir) as address, page_at(browser, address) as page:
         for number, name in enumerate((run_dir.name, other_dir.name)):
             page.click("#tab-now")
@@ -299,9 +294,7 @@ def test_click_on_a_plan_inspects_that_plan(browser: Any, run_dir: Path, other_d
 
 
 @pytest.mark.slow
-def test_two_runs_have_a_table_of_what_differs(
-    browser: Any, run_dir: Path, other_dir: Path
-) -> None:
+def test_two_runs_have_a_table_of_what_differs(browser, run_dir, other_dir):
     with served(run_dir, other_dir) as address, page_at(browser, address) as page:
         page.wait_for_selector(".differences >> text=Ana elsewhere")
         rows = page.locator(".differences tbody tr")
@@ -345,9 +338,7 @@ NEW_STATES = (open_palette, open_menu, play_reel, show_calendar, ask_wrongly)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_in_new_states(
-    browser: Any, run_dir: Path, other_dir: Path, scheme: str
-) -> None:
+def test_axe_finds_nothing_in_new_states(browser, run_dir, other_dir, scheme):
     if not AXE.exists():
         pytest.skip("axe-core is not installed: npm ci in page/")
     script = AXE.read_text(encoding="utf-8")

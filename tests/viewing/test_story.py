@@ -32,7 +32,7 @@ def told(*rows: tuple[float, str, str, str | None, str], **tables: pa.Table) -> 
     return {moment["title"]: moment for moment in story_of(run)}  # type: ignore[arg-type]
 
 
-def test_first_yes_is_the_first_that_was_accepted() -> None:
+def test_first_yes_is_the_first_that_was_accepted():
     story = told(
         (8, "astro", "asks", None, "vitamins ana"),
         (9, "astro", "accepted", None, "vitamins ana"),
@@ -43,7 +43,7 @@ def test_first_yes_is_the_first_that_was_accepted() -> None:
     assert "Ana accepts what Astro asks: vitamins" == story["The first yes"]["words"]
 
 
-def test_longest_search_is_told_when_it_found_somebody() -> None:
+def test_longest_search_is_told_when_it_found_somebody():
     story = told(
         (8, "astro", "find_begins", None, "ana"),
         (8.01, "astro", "found", None, "ana"),
@@ -56,7 +56,7 @@ def test_longest_search_is_told_when_it_found_somebody() -> None:
     assert round(20.05 * HOUR) == story["The longest search"]["step"]
 
 
-def test_time_asleep_and_out_is_not_out_of_view() -> None:
+def test_time_asleep_and_out_is_not_out_of_view():
     story = told(
         (0, "ana", "activity", None, "sleep"),
         (7, "ana", "activity", None, "breakfast"),
@@ -73,7 +73,7 @@ def test_time_asleep_and_out_is_not_out_of_view() -> None:
     assert 17 * HOUR == longest["step"]
 
 
-def test_who_is_seen_by_one_of_two_robots_is_in_view() -> None:
+def test_who_is_seen_by_one_of_two_robots_is_in_view():
     story = told(
         (6, "ana", "activity", None, "breakfast"),
         (6, "astro", "user_seen", "ana", ""),
@@ -101,13 +101,13 @@ def test_who_is_seen_by_one_of_two_robots_is_in_view() -> None:
         ),
     ],
 )  # fmt: skip
-def test_one_goes_to_bed_once_a_night(hours: dict[float, str], bed: str) -> None:
+def test_one_goes_to_bed_once_a_night(hours, bed):
     story = told(*((hour, "ana", "activity", None, what) for hour, what in hours.items()))
 
     assert f"Ana goes to bed at {bed}" == story["The latest night"]["words"]
 
 
-def test_bed_after_midnight_is_later_than_before() -> None:
+def test_bed_after_midnight_is_later_than_before():
     story = told(
         (23.5, "ana", "activity", None, "sleep"),
         (31, "ana", "activity", None, "breakfast"),
@@ -118,7 +118,7 @@ def test_bed_after_midnight_is_later_than_before() -> None:
     assert "Ana goes to bed at 01:00" == story["The latest night"]["words"]
 
 
-def test_beliefs_have_settled_where_the_error_stays_near_its_last_value() -> None:
+def test_beliefs_have_settled_where_the_error_stays_near_its_last_value():
     errors = [0.8, 0.4, 0.21, 0.3, 0.21, 0.2, 0.2]
     steps = [hour * HOUR for hour in range(6, 48, 6)]
     table = pa.table({"step": steps, "user": ["ana"] * 7, "tv": errors})
@@ -131,11 +131,11 @@ def test_beliefs_have_settled_where_the_error_stays_near_its_last_value() -> Non
     )
 
 
-def test_run_without_events_has_no_story() -> None:
+def test_run_without_events_has_no_story():
     assert {} == told()
 
 
-def test_home_without_people_has_no_story() -> None:
+def test_home_without_people_has_no_story():
     run = fleet2d.run(
         "bundled:paper",
         "simulation.duration=1 h",
@@ -149,7 +149,7 @@ def test_home_without_people_has_no_story() -> None:
 
 
 @pytest.mark.slow
-def test_story_is_in_the_order_of_its_moments() -> None:
+def test_story_is_in_the_order_of_its_moments():
     run = fleet2d.run("bundled:family", "simulation.duration=4 d")
 
     steps = [moment["step"] for moment in story_of(run)]

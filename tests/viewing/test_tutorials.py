@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scenes import Cli
 
 from fleet2d.viewing import tutorials
 
@@ -35,7 +34,7 @@ The end.
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(tutorials, "find_spec", lambda _: None)  # no Jupyter
     return tmp_path
@@ -47,7 +46,7 @@ def cells(path: Path) -> list[dict[str, str]]:
     return found
 
 
-def test_files_of_a_page_are_written_its_python_runs_and_all_else_is_text() -> None:
+def test_files_of_a_page_are_written_its_python_runs_and_all_else_is_text():
     found = tutorials.notebook_of(PAGE)["cells"]
 
     kinds = ["markdown", "code", "markdown", "code", "markdown"]
@@ -57,13 +56,13 @@ def test_files_of_a_page_are_written_its_python_runs_and_all_else_is_text() -> N
     assert "print(1)" == found[3]["source"]
 
 
-def test_there_are_more_notebooks_than_eleven() -> None:
+def test_there_are_more_notebooks_than_eleven():
     names = list(tutorials.sources())
     assert ["algorithm", "model", "product-test", "study"] == names[:4]
     assert 11 < len(names)
 
 
-def test_list_has_each_with_its_title(fleet2d: Cli) -> None:
+def test_list_has_each_with_its_title(fleet2d):
     code, out, _ = fleet2d("demo", "--list")
 
     assert 0 == code
@@ -73,7 +72,7 @@ def test_list_has_each_with_its_title(fleet2d: Cli) -> None:
     assert "Floor plans" == rows["floorplans"]
 
 
-def test_tutorial_is_that_of_the_documentation_with_its_pictures(here: Path, fleet2d: Cli) -> None:
+def test_tutorial_is_that_of_the_documentation_with_its_pictures(here, fleet2d):
     code, out, _ = fleet2d("demo", "--tutorial", "study")
 
     assert 0 == code
@@ -84,7 +83,7 @@ def test_tutorial_is_that_of_the_documentation_with_its_pictures(here: Path, fle
     assert "image/png" in json.dumps(of_code)
 
 
-def test_guide_has_no_links_to_pages_that_are_not_there(here: Path, fleet2d: Cli) -> None:
+def test_guide_has_no_links_to_pages_that_are_not_there(here, fleet2d):
     assert 0 == fleet2d("demo", "--tutorial", "layers")[0]
 
     text = (here / "layers" / "layers.ipynb").read_text(encoding="utf-8")
@@ -93,7 +92,7 @@ def test_guide_has_no_links_to_pages_that_are_not_there(here: Path, fleet2d: Cli
     assert "How long ago each place was seen" in text  # of a picture
 
 
-def test_links_to_other_sites_stay(tmp_path: Path) -> None:
+def test_links_to_other_sites_stay(tmp_path):
     page = tmp_path / "files.md"
     page.write_text(PAGE, encoding="utf-8")
 
@@ -102,7 +101,7 @@ def test_links_to_other_sites_stay(tmp_path: Path) -> None:
     assert text.endswith("See the other page and [a site](https://example.org).")
 
 
-def test_notebook_that_somebody_works_in_is_kept(here: Path, fleet2d: Cli) -> None:
+def test_notebook_that_somebody_works_in_is_kept(here, fleet2d):
     (here / "study").mkdir()
     (here / "study" / "study.ipynb").write_text("mine", encoding="utf-8")
 
@@ -111,7 +110,7 @@ def test_notebook_that_somebody_works_in_is_kept(here: Path, fleet2d: Cli) -> No
     assert "mine" == (here / "study" / "study.ipynb").read_text(encoding="utf-8")
 
 
-def test_unknown_tutorial_is_told_with_the_nearest_name(here: Path, fleet2d: Cli) -> None:
+def test_unknown_tutorial_is_told_with_the_nearest_name(here, fleet2d):
     code, _, err = fleet2d("demo", "--tutorial", "studdy")
 
     assert 2 == code
@@ -130,8 +129,8 @@ def run_of(calls: list[list[str]], code: int) -> Callable[..., Any]:
 
 
 def test_where_jupyter_refuses_as_to_root_it_is_told_where_the_notebook_is(
-    here: Path, fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    here, fleet2d, monkeypatch
+):
     monkeypatch.setattr(tutorials, "find_spec", lambda name: name == "notebook" or None)
     monkeypatch.setattr(subprocess, "run", run_of([], 1))
 
@@ -142,13 +141,7 @@ def test_where_jupyter_refuses_as_to_root_it_is_told_where_the_notebook_is(
 
 
 @pytest.mark.parametrize(("options", "opened"), [((), True), (("--no-view",), False)])
-def test_jupyter_opens_it_where_it_is_installed(
-    here: Path,
-    fleet2d: Cli,
-    monkeypatch: pytest.MonkeyPatch,
-    options: tuple[str, ...],
-    opened: bool,
-) -> None:
+def test_jupyter_opens_it_where_it_is_installed(here, fleet2d, monkeypatch, options, opened):
     calls: list[list[str]] = []
     monkeypatch.setattr(tutorials, "find_spec", lambda name: name == "notebook" or None)
     monkeypatch.setattr(subprocess, "run", run_of(calls, 0))
@@ -160,9 +153,7 @@ def test_jupyter_opens_it_where_it_is_installed(
     assert opened == (out == "")
 
 
-def test_folder_that_cannot_be_written_is_told(
-    here: Path, fleet2d: Cli, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_folder_that_cannot_be_written_is_told(here, fleet2d, monkeypatch):
     def full(path: Path, content: bytes) -> None:
         raise OSError(28, "No space left on device")
 
@@ -174,9 +165,7 @@ def test_folder_that_cannot_be_written_is_told(
     assert "study/study.ipynb can't be written: No space left on device" in err
 
 
-def test_installed_without_a_clone_the_package_has_them(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_installed_without_a_clone_the_package_has_them(monkeypatch, tmp_path):
     package = tmp_path / "lib" / "python3" / "fleet2d"
     (package / "docs" / "tutorials").mkdir(parents=True)
     (package / "docs" / "tutorials" / "first.ipynb").touch()
@@ -188,9 +177,7 @@ def test_installed_without_a_clone_the_package_has_them(
 @pytest.mark.parametrize(
     ("name", "told"), [("algorithm", "--out is the folder"), ("", "no tutorial")]
 )
-def test_what_a_tutorial_can_not_heed_is_told(
-    name: str, told: str, here: Path, fleet2d: Cli
-) -> None:
+def test_what_a_tutorial_can_not_heed_is_told(name, told, here, fleet2d):
     options = ["--out", "lessons"] if name else []
     code, _, err = fleet2d("demo", "--tutorial", name, *options)
 

@@ -1,6 +1,5 @@
 """Long-term and real-time presence in whole runs: outputs, rows, errors, and what others read."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,7 +44,7 @@ def stored():
     return run(content("19 h", **algorithms))
 
 
-def test_shares_of_each_user_and_hour_sum_to_one(stored) -> None:
+def test_shares_of_each_user_and_hour_sum_to_one(stored):
     names = [f"e_{name}" for name in ESTIMATORS] + [f"m_{name}" for name in MODELS]
     for name in (*names, "week", "sure"):
         rows = table(stored, name)
@@ -58,21 +57,21 @@ def test_shares_of_each_user_and_hour_sum_to_one(stored) -> None:
                 assert 0 <= rows["share"][mine & (rows["room"] == "away")][0] <= 1
 
 
-def test_likelihood_finds_a_meandering_user_at_home(stored) -> None:
+def test_likelihood_finds_a_meandering_user_at_home(stored):
     rows = table(stored, "e_likelihood", user="ben", room="away")
     assert rows["share"][-1] < 0.3
     rows = table(stored, "e_likelihood", user="ana", room="kitchen_1")
     assert rows["share"][-1] > 0.15
 
 
-def test_intervals_are_columns_and_the_others_have_none(stored) -> None:
+def test_intervals_are_columns_and_the_others_have_none(stored):
     rows = table(stored, "sure")
     assert (rows["low"] <= rows["share"]).all()
     assert (rows["share"] <= rows["high"]).all()
     assert "low" not in table(stored, "e_exposure_ratio")
 
 
-def test_a_run_is_the_same_with_and_without_other_learners(stored) -> None:
+def test_a_run_is_the_same_with_and_without_other_learners(stored):
     alone = run(
         content("19 h", e_likelihood={"type": "long_term_presence", "estimator": "likelihood"})
     )
@@ -80,7 +79,7 @@ def test_a_run_is_the_same_with_and_without_other_learners(stored) -> None:
     assert digests(stored)["trajectories"] == digests(alone)["trajectories"]
 
 
-def test_the_longest_span_changes_nothing() -> None:
+def test_the_longest_span_changes_nothing():
     digests_by_span = [
         digests(
             run(
@@ -111,12 +110,12 @@ def test_the_longest_span_changes_nothing() -> None:
         ({"type": "real_time_presence", "model": {"detection": 0.5}}, "'type' is needed"),
     ],
 )
-def test_wrong_settings_are_refused_with_a_message(settings: dict[str, Any], words: str) -> None:
+def test_wrong_settings_are_refused_with_a_message(settings, words):
     with pytest.raises(Fleet2DError, match=words):
         run(content(mine=settings))
 
 
-def test_presence_is_defined_without_users_or_cameras() -> None:
+def test_presence_is_defined_without_users_or_cameras():
     for robots in ({}, {"astro": {"type": "patrol", "camera": None}}):
         algorithms = {
             "ltp": {"type": "long_term_presence", "estimator": "likelihood"},
@@ -128,7 +127,7 @@ def test_presence_is_defined_without_users_or_cameras() -> None:
         assert np.isfinite(rows["share"]).all()
 
 
-def test_a_model_of_ones_own_is_read_by_its_path(tmp_path: Path) -> None:
+def test_a_model_of_ones_own_is_read_by_its_path(tmp_path):
     code = """
 import numpy as np
 from fleet2d.algorithms.presence.model import Model
@@ -151,7 +150,7 @@ class Sure(Model):
 
 
 @pytest.mark.slow
-def test_a_longer_step_than_a_minute_makes_bins_of_a_step() -> None:
+def test_a_longer_step_than_a_minute_makes_bins_of_a_step():
     slow = content(
         "2 d",
         ltp={"type": "long_term_presence", "estimator": "likelihood"},
@@ -162,7 +161,7 @@ def test_a_longer_step_than_a_minute_makes_bins_of_a_step() -> None:
     assert len(table(fleet2d.run(slow), "rtp")["step"]) == 2 * 288 * 3 * 7
 
 
-def test_a_run_can_start_from_the_learned_state_of_another(tmp_path: Path) -> None:
+def test_a_run_can_start_from_the_learned_state_of_another(tmp_path):
     algorithms = {
         "ltp": {"type": "long_term_presence", "estimator": "likelihood"},
         "rtp": {"type": "real_time_presence"},
@@ -184,7 +183,7 @@ def test_a_run_can_start_from_the_learned_state_of_another(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_every_estimator_has_all_variants_for_everybody() -> None:
+def test_every_estimator_has_all_variants_for_everybody():
     """Over all time with intervals and by hour of the week, both also with forgetting."""
     algorithms: dict[str, Any] = {}
     for name in ESTIMATORS:

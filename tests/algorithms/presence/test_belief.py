@@ -23,7 +23,7 @@ def some(**changes) -> Presence:
     return Presence(**{**values, **changes})
 
 
-def test_rooms_and_away_of_a_user_and_of_anyone() -> None:
+def test_rooms_and_away_of_a_user_and_of_anyone():
     presence = some()
     assert ("ana", "anyone") == presence.names
     assert [0.75, 0.25] == presence.share("ana").tolist()
@@ -34,14 +34,14 @@ def test_rooms_and_away_of_a_user_and_of_anyone() -> None:
     assert presence.high() is None
 
 
-def test_intervals_of_shares_leave_out_that_of_away() -> None:
+def test_intervals_of_shares_leave_out_that_of_away():
     low = np.array([[0.5, 0.125, 0.25], [0.25, 0.375, 0.0]])
     presence = some(interval=(low, low + 0.5))
     assert [0.5, 0.125] == presence.low("ana").tolist()
     assert [0.75, 0.875] == presence.high().tolist()
 
 
-def test_frozen_arrays_never_change_and_are_not_copied() -> None:
+def test_frozen_arrays_never_change_and_are_not_copied():
     presence = some()
     assert presence is copy.deepcopy(presence)
     assert presence is presence.at(NOON + timedelta(days=1))
@@ -49,7 +49,7 @@ def test_frozen_arrays_never_change_and_are_not_copied() -> None:
         presence.share("ana")[0] = 1
 
 
-def test_presence_of_an_unknown_user_is_refused_by_name() -> None:
+def test_presence_of_an_unknown_user_is_refused_by_name():
     with pytest.raises(ComponentError, match=r"'anna'.*There are: ana, anyone"):
         some().share("anna")
 
@@ -66,12 +66,12 @@ def test_presence_of_an_unknown_user_is_refused_by_name() -> None:
         ({"home": np.array([[0.5, 0.5]])}, "needs shares of shape"),
     ],
 )
-def test_what_is_no_distribution_is_refused(changes, words: str) -> None:
+def test_what_is_no_distribution_is_refused(changes, words):
     with pytest.raises(ComponentError, match=words):
         some(**changes)
 
 
-def test_presence_has_a_row_for_each_user_and_room_and_for_away() -> None:
+def test_presence_has_a_row_for_each_user_and_room_and_for_away():
     columns = some().to_columns(["hall", "bath"])
     rows = list(zip(*(columns[name] for name in ("user", "room", "share")), strict=True))
     assert [
@@ -86,7 +86,7 @@ def test_presence_has_a_row_for_each_user_and_room_and_for_away() -> None:
         some().to_columns(["a", "b", "c"])
 
 
-def test_each_hour_of_the_week_has_its_own() -> None:
+def test_each_hour_of_the_week_has_its_own():
     home = np.zeros((168, 2, 2))
     home[..., 0] = np.linspace(0, 1, 168)[:, None]
     home[..., 1] = 1 - home[..., 0]
@@ -99,7 +99,7 @@ def test_each_hour_of_the_week_has_its_own() -> None:
 
 
 @pytest.mark.parametrize("half_life", [None, 2.0])
-def test_sums_by_day_and_hour_equal_a_loop(half_life: float | None) -> None:
+def test_sums_by_day_and_hour_equal_a_loop(half_life):
     random = np.random.default_rng(1)
     day = np.sort(random.choice([100, 101, 103, 109, 110], 300))
     minute = np.concatenate([np.sort(random.integers(0, 1440, (day == d).sum())) for d in (100, 101, 103, 109, 110)])  # fmt: skip

@@ -40,9 +40,7 @@ def stationary(of: StayModel) -> np.ndarray:
 
 
 @given(st.integers(0, 500), st.integers(0, 6), st.integers(0, 23))
-def test_without_evidence_the_filter_converges_to_the_shares_of_the_hour(
-    seed: int, weekday: int, hour: int
-) -> None:
+def test_without_evidence_the_filter_converges_to_the_shares_of_the_hour(seed, weekday, hour):
     of, known = model(seed), habits(seed)
     now = known.at(of, weekday, [hour])[0]
     days = known.week.reshape(7, 24, -1)[:, hour]
@@ -54,7 +52,7 @@ def test_without_evidence_the_filter_converges_to_the_shares_of_the_hour(
     assert (now.stay >= 0.5 - 1e-12).all()
 
 
-def test_hours_that_are_alike_change_nothing() -> None:
+def test_hours_that_are_alike_change_nothing():
     of, known = model(1), habits(1)
     same = known._replace(week=np.tile(known.total / 168, (168, 1)))
     now = same.at(of, 2, [12])[0]
@@ -62,13 +60,13 @@ def test_hours_that_are_alike_change_nothing() -> None:
         assert np.abs(part - before).max() < 1e-9 if np.ndim(part) else part == before
 
 
-def test_on_the_first_day_nothing_is_known_of_hours() -> None:
+def test_on_the_first_day_nothing_is_known_of_hours():
     of, known = model(2), habits(2)
     assert of is known._replace(total=known.total / known.total[-1] * 1439).at(of, 0, [0])[0]
 
 
 @pytest.mark.parametrize("smoothing", [60.0, 1e9])
-def test_average_evidence_draws_to_the_average(smoothing: float) -> None:
+def test_average_evidence_draws_to_the_average(smoothing):
     of = model(3)
     usual, sure, smooth = (
         stationary(k)
@@ -79,7 +77,7 @@ def test_average_evidence_draws_to_the_average(smoothing: float) -> None:
         assert np.abs(smooth - usual).max() < 1e-3
 
 
-def test_rates_of_an_hour_without_transitions_are_bounded() -> None:
+def test_rates_of_an_hour_without_transitions_are_bounded():
     of, known = model(4), habits(4)
     week = known.week.copy()
     week[:, :-1] = 0

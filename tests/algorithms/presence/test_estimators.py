@@ -34,7 +34,7 @@ def learned(estimator: Estimator, bins, rooms: int = 3, users: int = 2, length: 
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_sighting_share_equals_the_reference(seed: int) -> None:
+def test_sighting_share_equals_the_reference(seed):
     bins = any_evidence(seed)
     result = learned(SightingShare(), bins)
     for row, user in enumerate(result.names):
@@ -43,7 +43,7 @@ def test_sighting_share_equals_the_reference(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_exposure_ratio_equals_the_reference(seed: int) -> None:
+def test_exposure_ratio_equals_the_reference(seed):
     bins = any_evidence(seed)
     result = learned(ExposureRatio(detection=0.8), bins)
     for row, user in enumerate(result.names):
@@ -54,7 +54,7 @@ def test_exposure_ratio_equals_the_reference(seed: int) -> None:
         assert away == pytest.approx(result.away(user), abs=1e-12)
 
 
-def test_audit_only_is_the_exposure_ratio_of_bins_in_audits() -> None:
+def test_audit_only_is_the_exposure_ratio_of_bins_in_audits():
     bins = any_evidence(1, bins=200)
     audit = AuditOnly(every=timedelta(minutes=30), length=timedelta(minutes=10))
     result = learned(audit, bins)
@@ -67,7 +67,7 @@ def test_audit_only_is_the_exposure_ratio_of_bins_in_audits() -> None:
     assert away == pytest.approx(result.away("u0"), abs=1e-12)
 
 
-def test_an_audit_longer_than_from_one_to_the_next_is_refused() -> None:
+def test_an_audit_longer_than_from_one_to_the_next_is_refused():
     with pytest.raises(ValidationError, match="can't be longer"):
         AuditOnly(every=timedelta(minutes=30), length=timedelta(hours=1))
 
@@ -86,7 +86,7 @@ def independent(bins: int, share: F64, seed: int) -> Evidence:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_exposure_ratio_estimates_the_truth_from_independent_looks(seed: int) -> None:
+def test_exposure_ratio_estimates_the_truth_from_independent_looks(seed):
     """Counts are binomial; each ratio is within 4.5 standard errors but once in 150,000 times."""
     truth = np.array([0.4, 0.2, 0.15, 0.05, 0.2])
     collected = independent(40_000, truth, seed)
@@ -101,7 +101,7 @@ def test_exposure_ratio_estimates_the_truth_from_independent_looks(seed: int) ->
     assert np.abs(naive.share("u0") - truth[:4] / 0.8).max() > 0.1
 
 
-def test_exposure_ratio_by_patches_finds_a_user_who_stays_in_a_corner() -> None:
+def test_exposure_ratio_by_patches_finds_a_user_who_stays_in_a_corner():
     """A robot that mostly sees the part of a room in which the person never is.
 
     By rooms that would count as having looked in vain. 8,000 looks at least at each patch: standard
@@ -124,7 +124,7 @@ def test_exposure_ratio_by_patches_finds_a_user_who_stays_in_a_corner() -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_without_any_evidence_all_rooms_are_alike_and_nobody_is_away(cls: type[Estimator]) -> None:
+def test_without_any_evidence_all_rooms_are_alike_and_nobody_is_away(cls):
     none = any_evidence(1).between(0, 0)
     result = learned(cls(), none)
     for user in ("u0", "u1", "anyone"):
@@ -133,9 +133,7 @@ def test_without_any_evidence_all_rooms_are_alike_and_nobody_is_away(cls: type[E
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_a_user_never_seen_has_a_distribution_and_an_only_room_has_all(
-    cls: type[Estimator],
-) -> None:
+def test_a_user_never_seen_has_a_distribution_and_an_only_room_has_all(cls):
     bins = any_evidence(2, bins=60, rooms=1)
     seen = bins.seen.copy()
     seen[:, 0] = 0
@@ -148,7 +146,7 @@ def test_a_user_never_seen_has_a_distribution_and_an_only_room_has_all(
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_a_home_without_known_users_has_anyone(cls: type[Estimator]) -> None:
+def test_a_home_without_known_users_has_anyone(cls):
     bins = any_evidence(3, users=0, bins=300)
     result = learned(cls(), bins, users=0)
     assert ("anyone",) == result.names
@@ -157,14 +155,14 @@ def test_a_home_without_known_users_has_anyone(cls: type[Estimator]) -> None:
 
 
 @pytest.mark.parametrize("cls", [SightingShare, ExposureRatio, AuditOnly])
-def test_estimates_do_not_depend_on_the_interval_of_updates(cls: type[Estimator]) -> None:
+def test_estimates_do_not_depend_on_the_interval_of_updates(cls):
     bins = any_evidence(4, bins=400)
     one, other = (learned(cls(), bins, length=length) for length in (1, 400))
     for user in one.names:
         assert one.with_away(user).tolist() == pytest.approx(other.with_away(user).tolist())
 
 
-def test_hours_of_the_week_are_smoothed_towards_the_whole() -> None:
+def test_hours_of_the_week_are_smoothed_towards_the_whole():
     bins = any_evidence(5, bins=300, users=1)
     estimator = ExposureRatio()
     learned(estimator, bins, users=1)
@@ -183,7 +181,7 @@ def test_hours_of_the_week_are_smoothed_towards_the_whole() -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_old_evidence_fades_with_the_half_life(cls: type[Estimator]) -> None:
+def test_old_evidence_fades_with_the_half_life(cls):
     """Ten days in one room, then two in another: with a half-life of a day the other has more."""
     bins = 12 * 1440
     where = np.where(np.arange(bins) < 10 * 1440, 0, 1)
@@ -203,7 +201,7 @@ def test_old_evidence_fades_with_the_half_life(cls: type[Estimator]) -> None:
 
 
 @pytest.mark.parametrize("cls", [SightingShare, ExposureRatio, Likelihood])
-def test_intervals_contain_the_estimate_and_need_two_whole_days(cls: type[Estimator]) -> None:
+def test_intervals_contain_the_estimate_and_need_two_whole_days(cls):
     estimator = cls()
     estimator.begin(4, 1)
     collected = independent(6 * 1440, np.array([0.4, 0.2, 0.15, 0.05, 0.2]), 1)
@@ -227,7 +225,7 @@ def test_intervals_contain_the_estimate_and_need_two_whole_days(cls: type[Estima
     assert (high <= wider[1]).all()
 
 
-def test_intervals_cover_the_truth_about_as_often_as_stated() -> None:
+def test_intervals_cover_the_truth_about_as_often_as_stated():
     """Of 30 runs with 4 rooms of 12 independent days, 80 % intervals cover 63 to 92 %.
 
     The percentile bootstrap of 11 days covers a little less than it says. 120 rooms that are
@@ -244,7 +242,7 @@ def test_intervals_cover_the_truth_about_as_often_as_stated() -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_learning_continues_from_a_learned_state(cls: type[Estimator]) -> None:
+def test_learning_continues_from_a_learned_state(cls):
     bins = any_evidence(6, bins=3000)
     estimator = cls()
     before = learned(estimator, bins, length=60)
@@ -260,7 +258,7 @@ def test_learning_continues_from_a_learned_state(cls: type[Estimator]) -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_state_learned_in_another_home_is_refused(cls: type[Estimator]) -> None:
+def test_state_learned_in_another_home_is_refused(cls):
     estimator, other = cls(), cls()
     learned(estimator, any_evidence(7))
     other.begin(5, 2)

@@ -26,7 +26,7 @@ def rhythmic(days: int, seed: int) -> Evidence:
 
 
 @pytest.mark.parametrize("days", [1, 4])
-def test_forecasts_equal_the_definition(days: int) -> None:
+def test_forecasts_equal_the_definition(days):
     collected = rhythmic(days, days)
     # With weights as published: in view as a whole or not at all.
     collected.watched[:] = collected.watched > 0
@@ -50,7 +50,7 @@ def test_forecasts_equal_the_definition(days: int) -> None:
                 assert expected == pytest.approx(by_order[k, 0, room, m], abs=1e-6)
 
 
-def test_a_daily_rhythm_is_detected_and_its_order_chosen() -> None:
+def test_a_daily_rhythm_is_detected_and_its_order_chosen():
     estimator = Fremen()
     estimator.begin(3, 1)
     for part in pieces(rhythmic(9, 1)):
@@ -63,7 +63,7 @@ def test_a_daily_rhythm_is_detected_and_its_order_chosen() -> None:
     assert np.ptp(week[:, 2]) < 0.15
 
 
-def test_before_a_day_is_over_all_rooms_are_alike() -> None:
+def test_before_a_day_is_over_all_rooms_are_alike():
     estimator = Fremen()
     estimator.begin(3, 1)
     estimator.observe(rhythmic(1, 2).between(0, 600))

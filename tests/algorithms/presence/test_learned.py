@@ -4,7 +4,6 @@ import copy
 import io
 from collections.abc import Callable
 from datetime import datetime, timedelta
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +31,7 @@ def begun(rooms: int = 3, users: int = 2) -> LearnedModel:
 
 @pytest.mark.parametrize("rooms", [1, 2, 40])
 @pytest.mark.parametrize("users", [0, 1, 8])
-def test_homes_and_households_of_any_size(rooms: int, users: int) -> None:
+def test_homes_and_households_of_any_size(rooms, users):
     model = begun(rooms, users)
     bins = any_evidence(1, users=users, bins=150, rooms=rooms)
 
@@ -43,7 +42,7 @@ def test_homes_and_households_of_any_size(rooms: int, users: int) -> None:
     assert ((away >= 0) & (away <= 1)).all()
 
 
-def test_a_robot_that_never_looks_is_sure_of_nothing() -> None:
+def test_a_robot_that_never_looks_is_sure_of_nothing():
     bins = evidence_of(np.zeros((1440, 5)), np.zeros((1440, 2, 5), np.int64))
 
     home, away = begun(5, 1).observe(bins)
@@ -52,7 +51,7 @@ def test_a_robot_that_never_looks_is_sure_of_nothing() -> None:
     assert belief.max() < 0.9
 
 
-def test_forecasts_begin_with_the_present_belief() -> None:
+def test_forecasts_begin_with_the_present_belief():
     model = begun(4, 1)
     home, away = model.observe(any_evidence(5, users=1, bins=300, rooms=4))
     now = model.presence(["u0"], MONDAY, 60_000_000, BeliefSeries(0, 1, home, away))
@@ -64,7 +63,7 @@ def test_forecasts_begin_with_the_present_belief() -> None:
 
 
 @pytest.mark.slow
-def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
+def test_it_is_better_than_what_it_corrects_in_an_unseen_home():
     routine = {"type": "real_time_presence", "model": "routine"}
     run = fleet2d.run(
         "bundled:paper",
@@ -82,7 +81,7 @@ def test_it_is_better_than_what_it_corrects_in_an_unseen_home() -> None:
 
 
 @pytest.fixture(scope="module")
-def unseen_error() -> Callable[[Callable[[F64], F64]], float]:
+def unseen_error():
     """Return the calibration error of changed beliefs in unseen homes with unseen people."""
     people = {
         "runs": 6,
@@ -119,22 +118,18 @@ def tempered(belief: F64, temperature: float) -> F64:
 
 
 @pytest.mark.slow
-def test_it_is_calibrated_in_unseen_homes_with_unseen_people(
-    unseen_error: Callable[[Callable[[F64], F64]], float],
-) -> None:
+def test_it_is_calibrated_in_unseen_homes_with_unseen_people(unseen_error):
     assert unseen_error(lambda belief: belief) < 0.05
 
 
 @pytest.mark.slow
-def test_beliefs_that_are_too_sure_too_unsure_or_late_are_not_calibrated(
-    unseen_error: Callable[[Callable[[F64], F64]], float],
-) -> None:
+def test_beliefs_that_are_too_sure_too_unsure_or_late_are_not_calibrated(unseen_error):
     assert unseen_error(lambda belief: tempered(belief, 1.5)) > 0.08
     assert unseen_error(lambda belief: tempered(belief, 1 / 1.5)) > 0.08
     assert unseen_error(lambda belief: np.roll(belief, 5, axis=0)) > 0.08
 
 
-def test_a_branch_and_a_learned_state_go_on_alike(tmp_path: Path) -> None:
+def test_a_branch_and_a_learned_state_go_on_alike(tmp_path):
     simulation = fleet2d.Simulation(
         "bundled:paper", "simulation.duration=8 h", seed=3, algorithms=LEARNED
     )
@@ -144,7 +139,7 @@ def test_a_branch_and_a_learned_state_go_on_alike(tmp_path: Path) -> None:
     assert simulation.run().digest == branch.run().digest
 
 
-def test_its_file_is_small() -> None:
+def test_its_file_is_small():
     assert WEIGHTS.stat().st_size < 1_000_000
 
 
@@ -170,16 +165,14 @@ def changed(**arrays: object) -> bytes:
         (changed(places=np.array([{}], object)), "can't be read as weights"),
     ],
 )
-def test_files_that_are_damaged_or_foreign_are_refused(
-    tmp_path: Path, content: bytes, words: str
-) -> None:
+def test_files_that_are_damaged_or_foreign_are_refused(tmp_path, content, words):
     (tmp_path / "own.npz").write_bytes(content)
 
     with pytest.raises(InputError, match=words):
         Weights.read(tmp_path / "own.npz")
 
 
-def test_a_damaged_file_is_refused_before_the_run(tmp_path: Path) -> None:
+def test_a_damaged_file_is_refused_before_the_run(tmp_path):
     (tmp_path / "own.npz").write_bytes(b"not a model")
     model = {"type": "learned", "weights": str(tmp_path / "own.npz")}
     with pytest.raises(Fleet2DError, match="can't be read as weights"):
@@ -191,7 +184,7 @@ def test_a_damaged_file_is_refused_before_the_run(tmp_path: Path) -> None:
         )
 
 
-def test_weights_are_read_as_they_were_saved(tmp_path: Path) -> None:
+def test_weights_are_read_as_they_were_saved(tmp_path):
     weights = Weights.read(WEIGHTS)
 
     weights.save(tmp_path / "copy.npz")
@@ -201,7 +194,7 @@ def test_weights_are_read_as_they_were_saved(tmp_path: Path) -> None:
     assert np.array_equal(weights.places, again.places)
 
 
-def test_a_run_names_a_missing_file(tmp_path: Path) -> None:
+def test_a_run_names_a_missing_file(tmp_path):
     missing = {
         "type": "real_time_presence",
         "model": {"type": "learned", "weights": str(tmp_path / "no.npz")},
@@ -210,7 +203,7 @@ def test_a_run_names_a_missing_file(tmp_path: Path) -> None:
         fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=1, algorithms={"rtp": missing})
 
 
-def test_the_time_of_the_run_is_no_leak() -> None:
+def test_the_time_of_the_run_is_no_leak():
     """Evidence is dated by its own bins: the start of the run is only where it begins."""
     bins = any_evidence(7, users=1, bins=50)
     one, other = LearnedModel(), LearnedModel()

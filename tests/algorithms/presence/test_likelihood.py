@@ -31,7 +31,7 @@ from fleet2d.kernels import F64, I64
 from fleet2d.metrics.ltp_error import total_variation
 
 
-def test_anyone_is_where_not_everybody_is_missing() -> None:
+def test_anyone_is_where_not_everybody_is_missing():
     one, other = np.array([[0.5, 0.25, 0.25]]), np.array([[0.5, 0.0, 0.5]])
     combined = with_anyone([one, other], np.zeros((1, 2), bool))[0]
     assert [0.75, 0.25, 0.125] == combined[2].tolist()
@@ -39,7 +39,7 @@ def test_anyone_is_where_not_everybody_is_missing() -> None:
     assert [0.75, 1.0, 0.0] == combined[2].tolist()
 
 
-def test_observations_of_no_user_are_unknown() -> None:
+def test_observations_of_no_user_are_unknown():
     bins = any_evidence(10, users=1)
     seen = np.zeros_like(bins.seen)
     seen[3, 1, 2] = 6
@@ -55,7 +55,7 @@ def learn(estimator, collected, rooms: int, users: int = 1):
 
 
 @pytest.mark.slow
-def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
+def test_stays_and_shares_are_those_the_person_was_drawn_from():
     """60 days and independent looks: the model is right, so only sampling is left.
 
     A room left some 300 times has a chance to leave with a standard error of 6 % of it, if all was
@@ -74,7 +74,7 @@ def test_stays_and_shares_are_those_the_person_was_drawn_from() -> None:
 
 
 @pytest.mark.slow
-def test_sighting_share_fails_under_hangout_but_likelihood_does_not() -> None:
+def test_sighting_share_fails_under_hangout_but_likelihood_does_not():
     """Robots that hang out where they saw somebody most: the rich get richer (6 runs of 30 days).
 
     Of 12 runs each the means were .65 and .10, with standard errors of .024 and .017: of 6, bounds
@@ -98,7 +98,7 @@ def test_sighting_share_fails_under_hangout_but_likelihood_does_not() -> None:
 
 
 @pytest.mark.slow
-def test_following_biases_exposure_ratio_but_not_likelihood() -> None:
+def test_following_biases_exposure_ratio_but_not_likelihood():
     """Robots that stay while they see the person: rooms left at once are watched too little."""
     errors = []
     for seed in range(4):
@@ -123,7 +123,7 @@ def audits(t: int, at: int, sees_person: bool, sightings, random: np.random.Gene
 
 
 @pytest.mark.slow
-def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between() -> None:
+def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between():
     """60 days have 720 looks at each room, timed by the clock: shares have errors of 0.02 at most.
 
     The total variation of five rooms is then about 0.02, and above 0.06 not once in 10,000 times.
@@ -140,7 +140,7 @@ def test_audits_by_the_clock_find_the_truth_whatever_the_robot_does_in_between()
 
 
 @pytest.mark.slow
-def test_independent_patrol_is_fair_to_all() -> None:
+def test_independent_patrol_is_fair_to_all():
     for seed in range(2):
         where = person(30 * DAY, 5, seed)
         collected, truth = evidence(where, 5, patrol, seed), shares_at_home(where, 5)
@@ -148,7 +148,7 @@ def test_independent_patrol_is_fair_to_all() -> None:
             assert total_variation(truth, learn(estimator, collected, 5).share("u0")) < 0.08
 
 
-def test_pieces_of_a_day_join_to_the_whole() -> None:
+def test_pieces_of_a_day_join_to_the_whole():
     day = any_evidence(11).days[1]
     whole = joined([day_evidence(piece) for piece in pieces(day, 7)])
     for one, other in zip(day_evidence(day), whole, strict=True):
@@ -156,7 +156,7 @@ def test_pieces_of_a_day_join_to_the_whole() -> None:
 
 
 @pytest.mark.slow
-def test_intervals_contain_the_truth_at_least_as_often_as_stated() -> None:
+def test_intervals_contain_the_truth_at_least_as_often_as_stated():
     """Ten days of a patrol, 20 runs of 4 rooms and away: 90 % intervals hold 96 %.
 
     Were each covered with 0.9, fewer than 80 of 100 would be once in a thousand times; all of them
@@ -199,7 +199,7 @@ def a_week_of_two_rooms(seed: int, island: list[int] | None) -> tuple[Likelihood
     return estimator, truth, total_variation(truth[:4], share)
 
 
-def test_time_out_of_sight_is_away_if_nothing_joins_the_other_rooms() -> None:
+def test_time_out_of_sight_is_away_if_nothing_joins_the_other_rooms():
     """Rooms that no robot can look into look like away, so that each got as much time as away."""
     for seed in (0, 1, 2):
         apart, truth, error = a_week_of_two_rooms(seed, [0, 0, 2, 3])
@@ -212,7 +212,7 @@ def test_time_out_of_sight_is_away_if_nothing_joins_the_other_rooms() -> None:
         assert at_large.with_away("u0")[2] == pytest.approx(at_large.away("u0"), rel=1e-6)
 
 
-def test_intervals_hold_the_time_that_may_be_in_rooms_never_watched() -> None:
+def test_intervals_hold_the_time_that_may_be_in_rooms_never_watched():
     for seed in (0, 1, 2):
         estimator, truth, _ = a_week_of_two_rooms(seed, [0, 0, 0, 0])
         low, high = estimator.interval(np.uint64(0), 0.9)
@@ -223,7 +223,7 @@ def test_intervals_hold_the_time_that_may_be_in_rooms_never_watched() -> None:
         assert apart[1][0, 4] - apart[0][0, 4] < high[0, 4] - low[0, 4]
 
 
-def test_a_part_of_the_home_counts_from_when_a_robot_looks_into_it() -> None:
+def test_a_part_of_the_home_counts_from_when_a_robot_looks_into_it():
     """Later a robot is carried to the other part, and the person, too."""
     where = np.repeat([0, 2], 2 * DAY)
     watched = np.eye(4)[where]

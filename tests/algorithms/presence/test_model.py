@@ -60,7 +60,7 @@ def followed(model: Model, bins: Evidence, rooms: int, users: int, length: int =
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_every_bin_has_a_distribution_for_everybody(cls: type[Model]) -> None:
+def test_every_bin_has_a_distribution_for_everybody(cls):
     for users in (0, 1, 2):
         track = followed(cls(), any_evidence(1, users=users, bins=200), 3, users).track
         assert (200, users + 1, 3) == track.home.shape
@@ -70,7 +70,7 @@ def test_every_bin_has_a_distribution_for_everybody(cls: type[Model]) -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_the_future_changes_nothing(cls: type[Model]) -> None:
+def test_the_future_changes_nothing(cls):
     """What is believed of a bin is the same whatever comes behind its update."""
     bins = any_evidence(2, bins=120)
     other = any_evidence(3, bins=120)
@@ -91,9 +91,7 @@ def test_the_future_changes_nothing(cls: type[Model]) -> None:
 
 @pytest.mark.parametrize("island", [None, [0, 0, 2]], ids=["joined", "islands"])
 @pytest.mark.parametrize("cls", [LastSeen, HourOfWeek, RoutineModel, LearnedModel])
-def test_a_table_of_beliefs_has_those_of_frequent_updates(
-    cls: type[Model], island: list[int] | None
-) -> None:
+def test_a_table_of_beliefs_has_those_of_frequent_updates(cls, island):
     """Every seven minutes, from periods of 35 minutes; what lies behind a row isn't used in it."""
     bins = any_evidence(2, bins=70)
     bins.watched[:40, 2] = 0  # so that the second island is unknown at first
@@ -123,13 +121,13 @@ def updates(algorithm: Any, bins: Evidence, length: int) -> list[dict[str, Any]]
     return made
 
 
-def test_a_table_of_beliefs_is_due_at_whole_minutes() -> None:
+def test_a_table_of_beliefs_is_due_at_whole_minutes():
     table = BeliefTable(model=LastSeen(), every=timedelta(seconds=90))
     with pytest.raises(ComponentError, match=r"algorithms\.x\.every must be a whole number of min"):
         updates(table, any_evidence(2), 20)
 
 
-def test_last_seen_is_the_room_of_the_newest_sighting() -> None:
+def test_last_seen_is_the_room_of_the_newest_sighting():
     bins = any_evidence(4, bins=150)
     track = followed(LastSeen(), bins, 3, 2, length=11).track
     for row in range(3):
@@ -142,7 +140,7 @@ def test_last_seen_is_the_room_of_the_newest_sighting() -> None:
     assert not track.away.any()
 
 
-def test_long_term_is_the_estimate_before_the_update() -> None:
+def test_long_term_is_the_estimate_before_the_update():
     bins = any_evidence(5, bins=90)
     track = followed(LongTerm(estimator=ExposureRatio()), bins, 3, 2, length=30).track
     estimator = ExposureRatio()
@@ -154,7 +152,7 @@ def test_long_term_is_the_estimate_before_the_update() -> None:
         estimator.observe(part)
 
 
-def test_hour_of_week_distinguishes_hours() -> None:
+def test_hour_of_week_distinguishes_hours():
     bins = evidence(person(3 * DAY, 3, 5), 3, patrol, 5)
     model = HourOfWeek(estimator=ExposureRatio(), smoothing=1)
     now = followed(model, bins, 3, 1)
@@ -164,7 +162,7 @@ def test_hour_of_week_distinguishes_hours() -> None:
         assert week.at(later).share("u0").tolist() == now.at(later).share("u0").tolist()
 
 
-def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
+def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting():
     watched, seen = np.ones((40, 3)), np.zeros((40, 2, 3), np.int64)
     seen[4, :, 1] = 1
     model = MarkovDecay()
@@ -180,7 +178,7 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting() -> None:
 
 
 @pytest.mark.parametrize("cls", CHAINS)
-def test_a_forecast_equals_filtering_without_evidence(cls: type[Model]) -> None:
+def test_a_forecast_equals_filtering_without_evidence(cls):
     bins = any_evidence(6, bins=60, users=1)
     after = bins.between(30, 60)
     start = SUNDAY_LATE + timedelta(minutes=30)
@@ -199,7 +197,7 @@ def test_a_forecast_equals_filtering_without_evidence(cls: type[Model]) -> None:
     assert twice.with_away("u0").tolist() == pytest.approx(once.with_away("u0").tolist())
 
 
-def test_a_forecast_does_not_change_with_later_evidence() -> None:
+def test_a_forecast_does_not_change_with_later_evidence():
     bins = evidence(person(DAY + 60, 3, 7), 3, patrol, 7)
     model = Filter()
     now = followed(model, bins.between(0, DAY), 3, 1)
@@ -217,7 +215,7 @@ def late_loss(track: Any, where: np.ndarray) -> float:
 
 
 @pytest.mark.slow
-def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
+def test_each_rung_of_the_ladder_is_better_than_the_one_below():
     """Log loss of the last 10 of 20 days of a Markov person, 4 runs; gaps are over 10 % of it."""
     scores = {cls: [] for cls in (LastSeen, LongTerm, MarkovDecay, Filter)}
     for seed in range(3):
@@ -232,7 +230,7 @@ def test_each_rung_of_the_ladder_is_better_than_the_one_below() -> None:
 
 
 @pytest.mark.parametrize("cls", ALL)
-def test_learning_continues_from_a_learned_state(cls: type[Model]) -> None:
+def test_learning_continues_from_a_learned_state(cls):
     bins = any_evidence(8, bins=2000)
     one, other = cls(), cls()
     followed(one, bins, 3, 2)
@@ -258,7 +256,7 @@ def sleeper(days: int, seed: int) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_models_with_hours_are_better_for_people_with_regular_hours() -> None:
+def test_models_with_hours_are_better_for_people_with_regular_hours():
     """Log loss of the last 10 of 20 days, 2 runs of a person whose days are alike."""
     scores = {cls: [] for cls in (SemiMarkov, RoutineModel)}
     for seed in range(2):
@@ -269,7 +267,7 @@ def test_models_with_hours_are_better_for_people_with_regular_hours() -> None:
     assert np.mean(scores[RoutineModel]) < 0.9 * np.mean(scores[SemiMarkov])
 
 
-def test_a_forecast_of_the_routine_uses_the_hours_until_then() -> None:
+def test_a_forecast_of_the_routine_uses_the_hours_until_then():
     where = sleeper(8, 3)
     now = followed(RoutineModel(), evidence(where, 3, patrol, 3), 3, 1)
     night = now.at(MONDAY + timedelta(hours=3)).with_away("u0")

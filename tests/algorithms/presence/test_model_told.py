@@ -37,7 +37,7 @@ def away_at(rows: dict[str, Any], step: int) -> float:
     return float(rows["share"][row])
 
 
-def test_who_is_said_to_be_away_is_believed_to_be_for_a_while() -> None:
+def test_who_is_said_to_be_away_is_believed_to_be_for_a_while():
     rtp, told = beliefs(AWAY, half_life="30 min")
     before, after, later = 299, 1199, 6899
 
@@ -46,19 +46,19 @@ def test_who_is_said_to_be_away_is_believed_to_be_for_a_while() -> None:
     assert away_at(rtp, later) < away_at(told, later) < away_at(told, after)
 
 
-def test_who_is_said_to_be_at_home_is_not_believed_to_be_away() -> None:
+def test_who_is_said_to_be_at_home_is_not_believed_to_be_away():
     rtp, told = beliefs(ana("bedroom"))
 
     assert away_at(told, 1199) < away_at(rtp, 1199)
 
 
 @pytest.mark.parametrize("source", ["long_term_presence", "belief_table"])
-def test_told_presence_of_another_algorithm_is_refused_before_the_run(source: str) -> None:
+def test_told_presence_of_another_algorithm_is_refused_before_the_run(source):
     algorithms = {"other": {"type": source}, "told": {"type": "told_presence", "reads": ["other"]}}
     with pytest.raises(ComponentError, match=r"algorithms\.told: 'other' is not a real-time"):
         fleet2d.Simulation(home(algorithms=algorithms))
 
 
-def test_told_presence_without_a_presence_is_refused() -> None:
+def test_told_presence_without_a_presence_is_refused():
     with pytest.raises(ComponentError, match="give `reads:"):
         fleet2d.run(home(algorithms={"told": {"type": "told_presence"}}))

@@ -49,7 +49,7 @@ def expected(seed: int, stages: int) -> tuple[Any, Moments, Any]:
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("stages", [1, 2])
-def test_expected_exits_and_time_equal_pairs_of_states(seed: int, stages: int) -> None:
+def test_expected_exits_and_time_equal_pairs_of_states(seed, stages):
     node, moments, pairs = expected(seed, stages)
     by_node = np.zeros((PLACES * stages,) * 2)
     np.add.at(by_node, (node[:, None], node[None]), pairs)
@@ -68,7 +68,7 @@ def test_expected_exits_and_time_equal_pairs_of_states(seed: int, stages: int) -
     assert np.abs(rests - moments.moves - moments.rests).max() < 1e-9
 
 
-def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() -> None:
+def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours():
     layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
     model = model_of(layout.no_moments(1), layout, PRIOR)
     assert [1 - 1 / MEAN_STAY] * 4 == pytest.approx(model.stay[0].tolist())
@@ -77,7 +77,7 @@ def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours() 
     assert [0.05, 0.05, 0.05, 0] == pytest.approx(model.restless[0].tolist())
 
 
-def test_transitions_are_counts_by_time_plus_one_prior_event() -> None:
+def test_transitions_are_counts_by_time_plus_one_prior_event():
     layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
     moments = layout.no_moments(1)
     moments.time[0, 0] = 880.0
@@ -113,7 +113,7 @@ def shown_of(stretches: Stretches) -> Any:
     return stretches.views[stretches.view]
 
 
-def test_equal_bins_are_merged_within_an_hour() -> None:
+def test_equal_bins_are_merged_within_an_hour():
     shown = [[0, 1, 0]] * 6 + [[0, 1, 0.5]] * 2
     seen = [[0, 0, 0]] * 2 + [[0, 7, 0]] * 2 + [[0, 3, 3]] * 2 + [[0, 0, 0]] * 2
     merged = first_stretches(bins_of(shown, seen, start=57), longest=5)
@@ -126,14 +126,14 @@ def test_equal_bins_are_merged_within_an_hour() -> None:
     assert [1] * 8 == first_stretches(bins_of(shown, seen), longest=1).bins.tolist()
 
 
-def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain() -> None:
+def test_where_somebody_unknown_was_seen_nothing_is_watched_in_vain():
     bins = bins_of([[1, 1, 1]], [[0, 0, 0]])
     seen = np.array([[[0, 0, 0], [0, 0, 4]]])  # anybody, but not the user
     bins = replace(bins, by_patch=bins.by_patch._replace(sightings=counts_of(seen)))
     assert [255, 255, 0, 0] == shown_of(first_stretches(bins, longest=1))[0].tolist()
 
 
-def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
+def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other():
     """However long a robot looks at one patch of a room, the other may have somebody in it."""
     prior, seen = Prior(0.9, 1e-6), [[0, 0, 0]] * 600
     bins = bins_of([[1, 0, 1]] * 600, seen)
@@ -147,7 +147,7 @@ def test_a_user_never_seen_in_a_watched_patch_may_be_in_the_other() -> None:
     assert places[300, 0] + 0.02 < again[300, 0]
 
 
-def test_revisited_days_count_once() -> None:
+def test_revisited_days_count_once():
     random = np.random.default_rng(3)
     looks = random.integers(0, 3, 3 * 1440)
     shown = np.eye(3)[looks]
@@ -181,7 +181,7 @@ def crowd_of(count: int, bins: int, seed: int) -> Evidence:
 
 @pytest.mark.parametrize("count", [1, 3, 4, 13])
 @pytest.mark.parametrize("stages", [1, 3])
-def test_people_learn_together_as_each_alone_to_the_last_bit(count: int, stages: int) -> None:
+def test_people_learn_together_as_each_alone_to_the_last_bit(count, stages):
     bins = crowd_of(count, 300, count)
     layout, day = StateLayout.of(bins, stages), day_evidence(bins)
     people = People(layout, PRIOR, count, longest=5)
@@ -204,7 +204,7 @@ def test_people_learn_together_as_each_alone_to_the_last_bit(count: int, stages:
             assert np.array_equal(part, expected)
 
 
-def test_merging_bins_loses_nothing() -> None:
+def test_merging_bins_loses_nothing():
     for seed in range(20):
         random = np.random.default_rng(seed)
         shown = random.choice([0, 255], (90, 3), p=[0.9, 0.1]).astype(np.uint8)

@@ -49,7 +49,7 @@ def choices(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[tupl
     return simulation, rows
 
 
-def test_the_request_that_was_chosen_is_served() -> None:
+def test_the_request_that_was_chosen_is_served():
     stored = run(asking())
 
     kinds = [kind for _, kind in events_of(stored)]
@@ -58,7 +58,7 @@ def test_the_request_that_was_chosen_is_served() -> None:
 
 
 @pytest.mark.slow
-def test_spans_are_invisible() -> None:
+def test_spans_are_invisible():
     def life(**settings: Any) -> Run:
         outcomes = ("sent_away", "accepted")
         return run(asking(users={"ana": ana(outcomes=outcomes)}), **settings)
@@ -72,7 +72,7 @@ def test_spans_are_invisible() -> None:
 @pytest.mark.parametrize(
     "outcomes", [("accepted",), ("deferred", "ignored"), ("sent_away", "declined")]
 )
-def test_actions_from_outside_repeat_the_run_of_the_policy(outcomes: tuple[str, ...]) -> None:
+def test_actions_from_outside_repeat_the_run_of_the_policy(outcomes):
     """Also where it is sent away, so that an order interrupts its question."""
 
     def life() -> dict[str, Any]:
@@ -89,14 +89,14 @@ def test_actions_from_outside_repeat_the_run_of_the_policy(outcomes: tuple[str, 
     assert np.array_equal(np.stack(OBSERVED), np.stack([table for _, table, _ in rows]))
 
 
-def test_who_waits_chooses_again_after_a_period_and_when_a_request_comes_up() -> None:
+def test_who_waits_chooses_again_after_a_period_and_when_a_request_comes_up():
     own = {"type": "ask_policy", "requests": 3, "period": "25 min"}
     _, rows = choices(asking(own, {"type": "patrol"}), lambda _, mask: len(mask) - 1)
 
     assert ["07:10", "07:20", "07:45", "08:10"] == [time for time, *_ in rows]
 
 
-def test_mask_has_what_is_open_and_the_wait() -> None:
+def test_mask_has_what_is_open_and_the_wait():
     own = {"type": "ask_policy", "requests": 3}
     simulation, rows = choices(asking(own, {"type": "patrol"}), lambda _, mask: len(mask) - 1)
 
@@ -106,7 +106,7 @@ def test_mask_has_what_is_open_and_the_wait() -> None:
     assert simulation.step == simulation.clock.steps
 
 
-def test_observation_is_of_the_queue_and_the_answers() -> None:
+def test_observation_is_of_the_queue_and_the_answers():
     outcomes = ("declined", "accepted")
     content = asking(users={"ana": ana(outcomes=outcomes)})
     _, rows = choices(content, lambda _, mask: int(mask.argmax()))
@@ -128,7 +128,7 @@ def test_observation_is_of_the_queue_and_the_answers() -> None:
     ("action", "reason"),
     [(1, "tea, which isn't open"), (2, "interaction 2, which doesn't exist"), (4, "from 0 to 3")],
 )
-def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str) -> None:
+def test_impossible_action_is_an_error_with_the_reason(action, reason):
     simulation = Simulation(asking({"type": "ask_policy", "requests": 3}))
     run_until_asked(simulation, "astro")
     behavior: Any = simulation.actors["astro"].behaviors[0]
@@ -137,11 +137,11 @@ def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str)
         behavior.check(now, action, behavior.mask(now))
 
 
-def test_more_interactions_than_rows_are_refused() -> None:
+def test_more_interactions_than_rows_are_refused():
     with pytest.raises(ComponentError, match=r"2 interactions.*set requests: 2"):
         run(asking({"type": "ask_policy", "requests": 1}))
 
 
-def test_policy_without_a_file_says_what_to_give() -> None:
+def test_policy_without_a_file_says_what_to_give():
     with pytest.raises(ComponentError, match="derive a class from AskPolicy"):
         run(asking({"type": "ask_policy"}))

@@ -69,7 +69,7 @@ def home_file(folder: Path, which: str) -> Path:
         if THOROUGH or i % 2 == j
     ],
 )
-def test_a_day_of_a_behavior_in_a_real_home(shared_data: Path, name: str, which: str) -> None:
+def test_a_day_of_a_behavior_in_a_real_home(shared_data, name, which):
     behaviors, expected = DAYS[name]
     ana = fleet2d.load_scenario("bundled:paper").users["ana"].model_dump(mode="json")
     body = {"battery": BATTERY} if "dock" in behaviors else {}
@@ -133,7 +133,7 @@ def product() -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_all_at_once_is_the_same_for_every_max_span_and_for_copies() -> None:
+def test_all_at_once_is_the_same_for_every_max_span_and_for_copies():
     stored = assert_same_for_every_max_span(product(), *((61, 7) if THOROUGH else (7,)))
     expected = {
         "docks", "charged", "visits", "find_begins", "found", "approaches", "interacts", "follows",
@@ -147,7 +147,7 @@ def test_all_at_once_is_the_same_for_every_max_span_and_for_copies() -> None:
 
 
 @pytest.mark.slow
-def test_without_its_behaviors_a_robot_leaves_everybody_the_same_life() -> None:
+def test_without_its_behaviors_a_robot_leaves_everybody_the_same_life():
     with_it, without = run(product()), product()
     without["robots"]["astro"]["behaviors"] = []
     other, nobody = run(without), run({**without, "robots": {}, "metrics": {}, "algorithms": {}})

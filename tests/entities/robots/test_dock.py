@@ -25,7 +25,7 @@ def levels(stored: Any) -> list[float]:
     return [float(detail.split(" ")[0]) for detail in details]
 
 
-def test_it_charges_in_time_and_the_patrol_goes_on() -> None:
+def test_it_charges_in_time_and_the_patrol_goes_on():
     stored = assert_same_for_every_max_span(charged(["dock", PATROL]), 61, 1)
     kinds = [name for name in names(stored) if name != "battery"]
     assert ["docks", "charged"] * 2 == kinds[:4]
@@ -33,7 +33,7 @@ def test_it_charges_in_time_and_the_patrol_goes_on() -> None:
     assert max(levels(stored)) == 100
 
 
-def test_the_charge_is_what_driving_and_standing_leave() -> None:
+def test_the_charge_is_what_driving_and_standing_leave():
     stored = run(charged(["dock", PATROL]))
     poses = path(stored, "astro")
     docks, detail = next((step, detail) for step, name, detail in events(stored) if name == "docks")
@@ -47,7 +47,7 @@ def test_the_charge_is_what_driving_and_standing_leave() -> None:
     assert float(detail.split(" ")[0]) == pytest.approx(expected, abs=4)
 
 
-def test_a_robot_that_never_docks_stands_still_when_it_is_empty() -> None:
+def test_a_robot_that_never_docks_stands_still_when_it_is_empty():
     stored = assert_same_for_every_max_span(charged([STAY], "3 h"), 61)
     assert [100.0, 0.0] == levels(stored)
     step = next(step for step, _, detail in events(stored) if detail == "0.0 %")
@@ -62,7 +62,7 @@ def test_a_robot_that_never_docks_stands_still_when_it_is_empty() -> None:
     assert 1 == len(set(poses.x[1802:].tolist()))
 
 
-def test_with_nothing_else_to_do_it_rests_at_the_charger() -> None:
+def test_with_nothing_else_to_do_it_rests_at_the_charger():
     content = charged([{"type": "dock", "rest": True}], "1 h", charge=0.5)
     content["robots"]["astro"]["start"] = [7.0, 1.0]
     stored = run(content)
@@ -70,7 +70,7 @@ def test_with_nothing_else_to_do_it_rests_at_the_charger() -> None:
     assert (1.0, 3.0) == pytest.approx((poses.x[-1], poses.y[-1]), abs=0.01)
 
 
-def test_without_a_battery_nothing_changes() -> None:
+def test_without_a_battery_nothing_changes():
     assert [] == names(run(home_with([PATROL])))
 
 
@@ -85,11 +85,11 @@ def test_without_a_battery_nothing_changes() -> None:
         ({"capacity": 3}, {}, "unknown key 'capacity'"),
     ],
 )
-def test_bad_settings_are_refused(battery: Any, dock: Any, words: str) -> None:
+def test_bad_settings_are_refused(battery, dock, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(charged([{"type": "dock", **dock}], **battery))
 
 
-def test_dock_without_a_battery_is_refused() -> None:
+def test_dock_without_a_battery_is_refused():
     with pytest.raises(InputError, match=r"robots\.astro: dock needs a battery"):
         fleet2d.Simulation(home_with(["dock"]))

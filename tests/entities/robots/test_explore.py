@@ -9,7 +9,7 @@ import fleet2d
 from fleet2d.errors import InputError
 
 
-def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others() -> None:
+def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others():
     content = home_with(
         ["explore", {"type": "patrol", "rooms": ["kitchen"], "dwell": "1 d"}], "15 min"
     )
@@ -27,7 +27,7 @@ def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others() -> None:
     assert "kitchen_1" == stored.plan.room_at(float(poses.x[-1]), float(poses.y[-1])).name
 
 
-def test_the_share_is_that_of_the_layer() -> None:
+def test_the_share_is_that_of_the_layer():
     simulation = fleet2d.Simulation(home_with(["explore"], "15 min"))
     simulation.run_until(simulation.clock.steps)
     explored = simulation.home.layers["explored.astro"].values
@@ -38,7 +38,7 @@ def test_the_share_is_that_of_the_layer() -> None:
     assert share == pytest.approx(float(detail.split(" ")[0]), abs=0.1)
 
 
-def test_what_can_not_be_seen_is_given_up() -> None:
+def test_what_can_not_be_seen_is_given_up():
     near_sighted = {"camera": {"range": [1.5, 3.0], "angle_deg": 60}}
     stored = assert_same_for_every_max_span(
         home_with([{"type": "explore", "enough": 1}], "1 h", astro=near_sighted), 61
@@ -47,7 +47,7 @@ def test_what_can_not_be_seen_is_given_up() -> None:
 
 
 @pytest.mark.parametrize("furnish", [False, True])
-def test_a_real_home_is_explored_in_minutes(furnish: bool) -> None:
+def test_a_real_home_is_explored_in_minutes(furnish):
     content = home_with(["explore"], "10 min")
     content["floorplan"] = {"type": "bundled", "furnish": furnish}
     content["users"] = {}
@@ -58,7 +58,7 @@ def test_a_real_home_is_explored_in_minutes(furnish: bool) -> None:
     assert names(stored).count("explores") < 40
 
 
-def test_behind_a_shut_door_it_goes_on_once_that_is_open() -> None:
+def test_behind_a_shut_door_it_goes_on_once_that_is_open():
     agenda = [
         {"at": "07:00", "open": True},
         {"at": "07:01", "open": False},
@@ -75,6 +75,6 @@ def test_behind_a_shut_door_it_goes_on_once_that_is_open() -> None:
     assert "explored" == names(stored)[-1]
 
 
-def test_a_robot_without_a_camera_is_refused() -> None:
+def test_a_robot_without_a_camera_is_refused():
     with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(home_with(["explore"], astro={"camera": None}))

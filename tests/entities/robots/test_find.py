@@ -1,7 +1,6 @@
 """Find: search for a person by what is believed, with a deadline, and a verdict."""
 
 from itertools import permutations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,7 +75,7 @@ def search(policy: str = "receding", **fields: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("policy", POLICIES)
-def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy: str) -> None:
+def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy):
     content = home_with([search(policy), STAY], "30 min", **belief(kitchen_1=1, bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     rows = [(name, step) for step, name, _ in events(stored) if name in ("find_begins", "found")]
@@ -88,7 +87,7 @@ def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy: str) -> No
     assert (poses.x[-1], poses.y[-1]) == pytest.approx((1.0, 3.0), abs=0.01)
 
 
-def test_in_a_real_home_the_exact_order_is_the_best_of_all(shared_data: Path) -> None:
+def test_in_a_real_home_the_exact_order_is_the_best_of_all(shared_data):
     """Rooms, ways and looks as they are; chances by size, and drawn."""
     for name in ("bundled", *sorted((shared_data / "houseexpo").glob("*.json"))[:2]):
         content = home_with([search()], **belief(kitchen_1=1))
@@ -115,7 +114,7 @@ def test_in_a_real_home_the_exact_order_is_the_best_of_all(shared_data: Path) ->
         assert max(costs, key=lambda policy: costs[policy]) in ("random", "nearest")
 
 
-def test_it_looks_first_where_it_is_told_to() -> None:
+def test_it_looks_first_where_it_is_told_to():
     right = run(home_with([search("likeliest"), STAY], "30 min", **belief(bathroom_1=1)))
     wrong = run(home_with([search("likeliest"), STAY], "30 min", **belief(bedroom_1=1)))
     times = [
@@ -124,14 +123,14 @@ def test_it_looks_first_where_it_is_told_to() -> None:
     assert times[0] + 10 < times[1]
 
 
-def test_it_gives_up_at_the_deadline() -> None:
+def test_it_gives_up_at_the_deadline():
     content = home_with([search(deadline="2 min"), STAY], "30 min", OUT, **belief(bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     rows = [(step, name) for step, name, _ in events(stored)]
     assert [(600, "find_begins"), (720, "gave_up")] == rows
 
 
-def test_it_says_not_at_home_once_all_is_looked_at_and_believed() -> None:
+def test_it_says_not_at_home_once_all_is_looked_at_and_believed():
     stored = run(home_with([search(), STAY], "30 min", OUT, **belief(bathroom_1=1, away=0.6)))
     assert ["find_begins", "not_at_home"] == names(stored)
     surer = run(
@@ -140,7 +139,7 @@ def test_it_says_not_at_home_once_all_is_looked_at_and_believed() -> None:
     assert ["find_begins", "gave_up"] == names(surer)
 
 
-def test_while_nothing_says_where_people_are_somebody_may_be_out() -> None:
+def test_while_nothing_says_where_people_are_somebody_may_be_out():
     blind = search(source=None, out_at=0.8, deadline="20 min")
     stored = assert_same_for_every_max_span(home_with([blind, STAY], "40 min", OUT), 61)
     assert ["find_begins", "not_at_home"] == names(stored)
@@ -148,7 +147,7 @@ def test_while_nothing_says_where_people_are_somebody_may_be_out() -> None:
     assert ["find_begins", "gave_up"] == names(sure)
 
 
-def test_a_search_that_can_not_begin_in_time_is_left_out() -> None:
+def test_a_search_that_can_not_begin_in_time_is_left_out():
     visit = {
         "type": "scheduled",
         "visits": [{"at": "07:05", "place": "kitchen", "dwell": "20 min"}],
@@ -163,7 +162,7 @@ def test_a_search_that_can_not_begin_in_time_is_left_out() -> None:
     assert 1 == names(stored).count("find_begins")  # the last of those that were due
 
 
-def test_who_else_comes_into_view_does_not_make_it_look_anew() -> None:
+def test_who_else_comes_into_view_does_not_make_it_look_anew():
     find = search("exact", source=None, at=[], every="10 min", out=0.9)
     content = home_with([find, STAY], "2 h", OUT, metrics={"time_to_find": {}})
     alone = run(content).metrics["time_to_find"]["astro"]
@@ -176,7 +175,7 @@ def test_who_else_comes_into_view_does_not_make_it_look_anew() -> None:
     assert among["out_mean"] < 1.1 * alone["out_mean"]
 
 
-def test_who_is_in_view_is_found_at_once() -> None:
+def test_who_is_in_view_is_found_at_once():
     content = home_with(
         [search(), STAY], "30 min", astro={"start": [5.5, 6.0]}, **belief(kitchen_1=1)
     )
@@ -186,7 +185,7 @@ def test_who_is_in_view_is_found_at_once() -> None:
     assert (600, "found") in rows
 
 
-def test_anyone_and_intervals_and_no_source_will_do() -> None:
+def test_anyone_and_intervals_and_no_source_will_do():
     every = {"type": "find", "every": "20 min", "deadline": "5 min"}
     stored = run(home_with([every, STAY], "1 h 10 min"))
     begun = [step for step, name, _ in events(stored) if name == "find_begins"]
@@ -194,13 +193,13 @@ def test_anyone_and_intervals_and_no_source_will_do() -> None:
     assert 3 == names(stored).count("found")
 
 
-def test_it_breaks_in_and_the_patrol_goes_on() -> None:
+def test_it_breaks_in_and_the_patrol_goes_on():
     patrol = {"type": "patrol", "rooms": ["kitchen", "bedroom", "living_room"], "dwell": "7 min"}
     stored = run(home_with([search(), patrol], "1 h", **belief(bathroom_1=1)))
     assert ["find_begins", "found"] == names(stored)
 
 
-def test_a_distribution_of_an_own_algorithm_will_do() -> None:
+def test_a_distribution_of_an_own_algorithm_will_do():
     stored = run(home_with([search(source="share"), STAY], "30 min", algorithms=SHARE))
     assert "found" in names(stored)
 
@@ -215,12 +214,12 @@ def test_a_distribution_of_an_own_algorithm_will_do() -> None:
         ({"source": "rpt"}, "there is no algorithm 'rpt': did you mean 'rtp'"),
     ],
 )
-def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+def test_bad_settings_are_refused(fields, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(home_with([search(**fields)], **belief(kitchen_1=1)))
 
 
-def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it() -> None:
+def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it():
     algorithms = {"tick": {"type": "tests.own_components:Keeper", "period": "1 min"}}
     content = home_with([search(source="tick"), STAY], "30 min", algorithms=algorithms)
     with pytest.raises(
@@ -229,6 +228,6 @@ def test_an_output_that_says_nothing_of_rooms_is_an_error_that_names_it() -> Non
         run(content)
 
 
-def test_a_robot_without_a_camera_is_refused() -> None:
+def test_a_robot_without_a_camera_is_refused():
     with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(home_with([search()], astro={"camera": None}, **belief(kitchen_1=1)))

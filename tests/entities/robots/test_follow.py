@@ -30,7 +30,7 @@ SEES_WIDE = {
 }
 
 
-def test_it_stays_near_a_person_who_walks_through_rooms() -> None:
+def test_it_stays_near_a_person_who_walks_through_rooms():
     content = home_with([{"type": "follow", "update": "1 s"}], "10 min", WALKS, astro=SEES_WIDE)
     stored = assert_same_for_every_max_span(content)
     assert "follows" == names(stored)[0]
@@ -45,7 +45,7 @@ def test_it_stays_near_a_person_who_walks_through_rooms() -> None:
     )
 
 
-def test_who_is_lost_is_looked_for_once_where_she_was_last() -> None:
+def test_who_is_lost_is_looked_for_once_where_she_was_last():
     leaves = {
         "type": "tests.own_components:Scripted",
         "start": [7.0, 6.0],
@@ -56,7 +56,7 @@ def test_who_is_lost_is_looked_for_once_where_she_was_last() -> None:
     assert len(np.unique(path(stored, "astro").x[-200:])) == 1
 
 
-def test_it_follows_no_longer_than_told() -> None:
+def test_it_follows_no_longer_than_told():
     stored = run(
         home_with(
             [{"type": "follow", "longest": "1 min", "cooldown": "1 h"}],
@@ -67,13 +67,13 @@ def test_it_follows_no_longer_than_told() -> None:
     assert ["follows"] == names(stored)
 
 
-def test_only_whom_it_is_told_to() -> None:
+def test_only_whom_it_is_told_to():
     content = home_with([{"type": "follow", "user": "ben"}], "5 min", astro={"start": [5.0, 6.0]})
     content["users"]["ben"] = OUT
     assert [] == names(run(content))
 
 
-def test_a_robot_without_a_camera_is_refused() -> None:
+def test_a_robot_without_a_camera_is_refused():
     with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(home_with(["follow"], astro={"camera": None}))
 
@@ -87,7 +87,7 @@ def test_a_robot_without_a_camera_is_refused() -> None:
     ],
     ids=lambda behavior: str(behavior["type"]),
 )
-def test_a_user_that_there_is_not_is_refused_before_the_run(behavior: dict[str, object]) -> None:
+def test_a_user_that_there_is_not_is_refused_before_the_run(behavior):
     with pytest.raises(InputError, match=r"behaviors\.1: there is no user 'anna'.*'ana'"):
         fleet2d.load_scenario(
             "bundled:paper", robots={"astro": {"behaviors": ["patrol", behavior]}}

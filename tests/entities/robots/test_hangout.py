@@ -28,14 +28,14 @@ def hangout(**fields: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("near", ["room", "view", "path"])
-def test_it_goes_where_people_are_believed_to_be(near: str) -> None:
+def test_it_goes_where_people_are_believed_to_be(near):
     content = home_with([hangout(near=near)], "40 min", **belief(bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     assert "bathroom_1" == rooms(stored)[-1]
     assert names(stored)[-1] == "relocates"
 
 
-def test_nearness_by_path_falls_with_the_time_on_foot() -> None:
+def test_nearness_by_path_falls_with_the_time_on_foot():
     simulation = fleet2d.Simulation(home_with([hangout(near="path")], **belief(kitchen_1=1)))
     astro, places = simulation.actors["astro"], simulation.actors["astro"].behaviors[0].places  # type: ignore[attr-defined]
     kitchen = simulation.home.plan.room("kitchen_1").index
@@ -49,18 +49,18 @@ def test_nearness_by_path_falls_with_the_time_on_foot() -> None:
     assert decay(x) == pytest.approx(np.exp(-x), rel=1e-4)
 
 
-def test_it_stays_out_of_rooms_but_near_them_if_told() -> None:
+def test_it_stays_out_of_rooms_but_near_them_if_told():
     content = home_with([hangout(no_stops_in=["bathroom"])], "40 min", **belief(bathroom_1=1))
     assert "kitchen_1" == rooms(run(content))[-1]
 
 
-def test_a_kind_of_room_that_the_home_lacks_is_avoided_all_the_same() -> None:
+def test_a_kind_of_room_that_the_home_lacks_is_avoided_all_the_same():
     content = home_with([hangout(no_stops_in=["garage"])], "10 min", **belief(bathroom_1=1))
     plain = home_with([hangout()], "10 min", **belief(bathroom_1=1))
     assert rooms(run(plain)) == rooms(run(content))
 
 
-def test_it_stands_off_doors_ways_and_seats() -> None:
+def test_it_stands_off_doors_ways_and_seats():
     content = home_with([hangout()], "5 min", **belief(bathroom_1=1))
     content["floorplan"] = {"type": "bundled", "furnish": True}
     content["robots"]["astro"].pop("start")
@@ -80,7 +80,7 @@ def test_it_stands_off_doors_ways_and_seats() -> None:
     assert 0 == places.block[free] == places.prox[free]
 
 
-def test_a_free_place_beats_one_in_the_way() -> None:
+def test_a_free_place_beats_one_in_the_way():
     simulation = Simulation(home_with([hangout()], **belief(kitchen_1=1)))
     behavior: Any = simulation.actors["astro"].behaviors[0]
     ways = behavior.places.block
@@ -88,7 +88,7 @@ def test_a_free_place_beats_one_in_the_way() -> None:
     assert (ways == 0).any()
 
 
-def test_it_moves_rarely() -> None:
+def test_it_moves_rarely():
     moody = {"algorithms": SHARE}
     stored = run(
         home_with([hangout(source="share", explore=0)], "12 h", {"type": "meander"}, **moody)
@@ -104,7 +104,7 @@ def test_it_moves_rarely() -> None:
     assert min((b - a for a, b in pairwise(moves)), default=600) >= 600
 
 
-def test_it_stands_still_in_quiet_hours() -> None:
+def test_it_stands_still_in_quiet_hours():
     content = home_with([hangout(explore=1, quiet="07:30-08:30")], "2 h", **belief(bathroom_1=1))
     stored = assert_same_for_every_max_span(content, 61)
     poses = path(stored, "astro")
@@ -115,7 +115,7 @@ def test_it_stands_still_in_quiet_hours() -> None:
     assert len([step for step in steps if step >= 5400]) >= 3
 
 
-def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet() -> None:
+def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet():
     content = home_with(
         [hangout(no_stops_in=["bedroom"], quiet="06:00-09:00")], "1 h", **belief(bathroom_1=1)
     )
@@ -127,7 +127,7 @@ def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet() -> None:
     assert [] == names(run(elsewhere))
 
 
-def test_called_away_it_goes_back_to_its_place_without_deciding_again() -> None:
+def test_called_away_it_goes_back_to_its_place_without_deciding_again():
     visit = {
         "type": "scheduled",
         "visits": [{"at": "07:15", "place": "living_room", "dwell": "2 min"}],
@@ -140,7 +140,7 @@ def test_called_away_it_goes_back_to_its_place_without_deciding_again() -> None:
     assert (poses.x[960], poses.y[960]) != (poses.x[-1], poses.y[-1])
 
 
-def test_it_explores_all_rooms_with_equal_chances() -> None:
+def test_it_explores_all_rooms_with_equal_chances():
     stored = run(home_with([hangout(explore=1)], "2 d", **belief(bathroom_1=1)))
     details = [detail for _, name, detail in events(stored) if name == "explores"]
     shares = {room: details.count(room) / len(details) for room in set(details)}
@@ -151,7 +151,7 @@ def test_it_explores_all_rooms_with_equal_chances() -> None:
 
 
 @pytest.mark.parametrize("ana", ["meander", {"type": "routine", "persona": "works_outside"}])
-def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
+def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana):
     on = run(home_with([hangout()], "6 h", ana, **belief(bathroom_1=1)))
     off = run(home_with([], "6 h", ana, **belief(bathroom_1=1)))
     gone = run({**home_with([], "6 h", ana), "robots": {}})
@@ -178,12 +178,12 @@ def test_turning_it_off_leaves_the_life_of_people_as_it_was(ana: Any) -> None:
         ({"user": "anna"}, "there is no user 'anna'"),
     ],
 )
-def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+def test_bad_settings_are_refused(fields, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(home_with([hangout(**fields)], **belief(kitchen_1=1)))
 
 
-def test_ways_from_where_it_stands_are_those_of_the_home_as_it_is_then() -> None:
+def test_ways_from_where_it_stands_are_those_of_the_home_as_it_is_then():
     content = home_with([hangout(moving=0.5)], **belief(kitchen_1=1))
     simulation = Simulation(
         content | {"objects": {"gate": {"type": "door", "doorway": "kitchen_1-bathroom_1"}}}

@@ -72,7 +72,7 @@ def events_of(run: fleet2d.Run, *kinds: str) -> list[tuple[int, str]]:
     ]
 
 
-def test_a_reminder_is_given_once_it_is_due() -> None:
+def test_a_reminder_is_given_once_it_is_due():
     run = fleet2d.run(home())
     (due, _), (asks, _), (accepted, _), (delivered, _) = happened = events_of(run)
 
@@ -83,14 +83,14 @@ def test_a_reminder_is_given_once_it_is_due() -> None:
 
 
 @pytest.mark.parametrize("max_span", some([7, 1], 2))
-def test_spans_are_invisible(max_span: int) -> None:
+def test_spans_are_invisible(max_span):
     content = home("30 min", users={"ana": ana(outcomes=("deferred", "accepted"))})
     content["users"]["ana"]["answers"] = {"defers": 1}
     other = {**content, "simulation": {**content["simulation"], "max_span": max_span}}
     assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))
 
 
-def test_a_deferred_reminder_comes_back_at_its_time() -> None:
+def test_a_deferred_reminder_comes_back_at_its_time():
     run = fleet2d.run(home(users={"ana": ana(outcomes=("deferred", "accepted"))}))
     happened = events_of(run, "asks", "deferred", "accepted")
 
@@ -99,13 +99,13 @@ def test_a_deferred_reminder_comes_back_at_its_time() -> None:
     assert 12 * 60 <= again - deferred < 12 * 60 + 120
 
 
-def test_a_declined_reminder_is_dropped_and_the_robot_withdraws() -> None:
+def test_a_declined_reminder_is_dropped_and_the_robot_withdraws():
     run = fleet2d.run(home(users={"ana": ana(outcomes=("declined",))}))
 
     assert ["due", "asks", "declined", "withdraws"] == [event for _, event in events_of(run)]
 
 
-def test_who_gives_no_answer_is_not_asked_again_in_the_same_place() -> None:
+def test_who_gives_no_answer_is_not_asked_again_in_the_same_place():
     """A sleeper is never asked in vain twice."""
     run = fleet2d.run(home(users={"ana": ana("bedroom", ("",))}))
 
@@ -113,7 +113,7 @@ def test_who_gives_no_answer_is_not_asked_again_in_the_same_place() -> None:
     assert ["due", "asks", "withdraws", "expired"] == happened
 
 
-def test_who_has_moved_is_asked_again() -> None:
+def test_who_has_moved_is_asked_again():
     items = [
         {"at": "00:10", "place": "bedroom", "activity": "sleep"},
         {"at": "07:40", "place": "kitchen", "activity": "breakfast"},
@@ -127,7 +127,7 @@ def test_who_has_moved_is_asked_again() -> None:
     assert happened[0][0] < 40 * 60 < happened[1][0]
 
 
-def test_a_banned_room_stays_empty() -> None:
+def test_a_banned_room_stays_empty():
     users = {"ana": ana("bedroom", ("banned",))}
     run = fleet2d.run(home("3 h", users=users))
     (banned,) = events_of(run, "banned")
@@ -142,7 +142,7 @@ def test_a_banned_room_stays_empty() -> None:
     assert not any("bedroom" in str(room) for room in after)
 
 
-def test_a_robot_that_is_switched_off_stands_still_until_it_is_on_again() -> None:
+def test_a_robot_that_is_switched_off_stands_still_until_it_is_on_again():
     users = {"ana": ana(outcomes=("switched_off",))}
     users["ana"]["answers"] = Scripted(outcomes=("switched_off",), off_for="30 min")
     run = fleet2d.run(home("2 h", users=users))
@@ -158,7 +158,7 @@ def test_a_robot_that_is_switched_off_stands_still_until_it_is_on_again() -> Non
     assert moves(off + 1800, off + 3600)
 
 
-def test_a_robot_that_is_switched_off_neither_sees_nor_hears() -> None:
+def test_a_robot_that_is_switched_off_neither_sees_nor_hears():
     users = {"ana": ana(outcomes=("switched_off",))}
     users["ana"]["answers"] = Scripted(
         outcomes=("switched_off",),
@@ -189,7 +189,7 @@ def test_a_robot_that_is_switched_off_neither_sees_nor_hears() -> None:
         ("remind(ana) declined or not remind(ana) delivered within 1 h", False),
     ],
 )
-def test_answers_are_expected_in_words(text: str, holds: bool) -> None:
+def test_answers_are_expected_in_words(text, holds):
     song = {"do": "offer", "to": "ana", "at": ["07:15"], "within": "1 h"}
     run = fleet2d.run(home(interactions={"pill": PILL, "song": song}, expect={"answers": text}))
     (verdict,) = run.manifest["expectations"].values()
@@ -206,12 +206,12 @@ def test_answers_are_expected_in_words(text: str, holds: bool) -> None:
         ("remind(ana) accepted within 3 d", "3 d is beyond the run"),
     ],
 )
-def test_answers_that_nobody_can_give_are_refused(text: str, message: str) -> None:
+def test_answers_that_nobody_can_give_are_refused(text, message):
     with pytest.raises(ScenarioError, match=re.escape(message)):
         fleet2d.run(home(expect={"answers": text}))
 
 
-def test_an_opportunity_is_taken_when_the_person_comes_into_view() -> None:
+def test_an_opportunity_is_taken_when_the_person_comes_into_view():
     behaviors = [{"type": "opportunistic"}, {"type": "patrol"}]
     run = fleet2d.run(home(robots={"astro": {"behaviors": behaviors}}))
 
@@ -219,7 +219,7 @@ def test_an_opportunity_is_taken_when_the_person_comes_into_view() -> None:
     assert ["due", "asks", "accepted", "delivered"] == happened
 
 
-def test_who_is_addressed_in_place_of_another_has_less_trust_in_the_robot() -> None:
+def test_who_is_addressed_in_place_of_another_has_less_trust_in_the_robot():
     users = {
         "ana": ana([4.5, 3.5]) | {"answers": {"notice": {"base": 9}}},
         "ben": ana([1.0, 3.5]) | {"answers": {"notice": {"base": 9}}},
@@ -238,7 +238,7 @@ def test_who_is_addressed_in_place_of_another_has_less_trust_in_the_robot() -> N
     assert 0.5 * 0.7 == pytest.approx(trust)
 
 
-def test_a_run_that_is_branched_goes_on_the_same() -> None:
+def test_a_run_that_is_branched_goes_on_the_same():
     import copy
 
     content = home("1 h", users={"ana": ana()})
@@ -262,7 +262,7 @@ class Believed(Algorithm):
 
 
 @pytest.mark.parametrize(("out", "moves"), [(0.9, False), (0.5, True)])
-def test_nobody_is_looked_for_who_is_likely_out(out: float, moves: bool) -> None:
+def test_nobody_is_looked_for_who_is_likely_out(out, moves):
     content = home(
         "40 min",
         users={"ana": {"type": "schedule", "days": [{"items": [{"at": "00:10", "away": True}]}]}},
@@ -274,7 +274,7 @@ def test_nobody_is_looked_for_who_is_likely_out(out: float, moves: bool) -> None
     assert moves == bool(np.ptp(rows["x"][rows["entity"] == "astro"]) > 1)
 
 
-def test_who_is_out_is_looked_for_less_and_less_often() -> None:
+def test_who_is_out_is_looked_for_less_and_less_often():
     content = home(
         "8 h",
         users={"ana": {"type": "schedule", "days": [{"items": [{"at": "00:10", "away": True}]}]}},
@@ -289,7 +289,7 @@ def test_who_is_out_is_looked_for_less_and_less_often() -> None:
     assert [30, 97, 120, 120] == pytest.approx(pauses[pauses > 5].tolist(), abs=3)
 
 
-def test_who_gave_no_answer_is_not_looked_for_within_four_hours() -> None:
+def test_who_gave_no_answer_is_not_looked_for_within_four_hours():
     rounds: list[int] = []
 
     class Watched(Interact):
@@ -316,7 +316,7 @@ def test_who_gave_no_answer_is_not_looked_for_within_four_hours() -> None:
 MONDAY = datetime(2026, 1, 5, 10)
 
 
-def test_an_empty_round_is_doubted_until_it_fades_or_the_person_is_seen() -> None:
+def test_an_empty_round_is_doubted_until_it_fades_or_the_person_is_seen():
     memory = RoundMemory()
     memory.note_empty("ana", MONDAY, 0.5, 0.25)
     doubted, later = (memory.chance("ana", MONDAY + timedelta(hours=h), 0.5) for h in (0, 8))
@@ -327,7 +327,7 @@ def test_an_empty_round_is_doubted_until_it_fades_or_the_person_is_seen() -> Non
     assert 0.5 == memory.chance("ana", MONDAY + timedelta(hours=1, minutes=60), 0.5)
 
 
-def test_rounds_of_an_hour_are_remembered_by_kind_of_day_and_forgotten_in_weeks() -> None:
+def test_rounds_of_an_hour_are_remembered_by_kind_of_day_and_forgotten_in_weeks():
     memory = RoundMemory()
     for day in range(3):
         memory.note_empty("ana", MONDAY + timedelta(days=day), 0.8, 0.25)
@@ -340,7 +340,7 @@ def test_rounds_of_an_hour_are_remembered_by_kind_of_day_and_forgotten_in_weeks(
     assert 0.75 < chance(days=70) < 0.8
 
 
-def test_sightings_wake_nobody_who_wants_nothing() -> None:
+def test_sightings_wake_nobody_who_wants_nothing():
     asked: list[int] = []
 
     class Watched(Interact):
@@ -360,6 +360,6 @@ def test_sightings_wake_nobody_who_wants_nothing() -> None:
     assert not {step + 1 for step in seen if step > delivered[0] + 5} & set(asked) - set(ends)
 
 
-def test_interact_without_requests_is_refused() -> None:
+def test_interact_without_requests_is_refused():
     with pytest.raises(ScenarioError, match="write a section `interactions`"):
         fleet2d.run(home(interactions={}))

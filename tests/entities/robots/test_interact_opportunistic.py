@@ -1,7 +1,5 @@
 """Opportunistic: approach who comes into view, interact, and go on with what was interrupted."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.entities.robots.robots import (
@@ -20,7 +18,7 @@ from fleet2d.errors import InputError
 PATROL = {"type": "patrol", "rooms": ["kitchen", "bathroom", "bedroom"], "dwell": "2 min"}
 
 
-def test_it_approaches_interacts_and_the_patrol_goes_on() -> None:
+def test_it_approaches_interacts_and_the_patrol_goes_on():
     content = home_with([{"type": "opportunistic", "interaction": "90 s", "again": "1 d"}, PATROL])
     stored = assert_same_for_every_max_span(content)
     assert ["approaches", "interacts", "interaction_over"] == names(stored)
@@ -36,14 +34,14 @@ def test_it_approaches_interacts_and_the_patrol_goes_on() -> None:
     assert ["kitchen_1", "bathroom_1", "bedroom_1", "kitchen_1"] == visited[after - 1 : after + 3]
 
 
-def test_it_leaves_the_same_person_alone_for_a_while() -> None:
+def test_it_leaves_the_same_person_alone_for_a_while():
     content = home_with([{"type": "opportunistic", "again": "20 min"}, PATROL], "2 h")
     steps = [step for step, name, _ in events(run(content)) if name == "approaches"]
     assert len(steps) >= 3
     assert min(np.diff(steps)) >= 1200
 
 
-def test_whom_it_does_not_want_and_what_chance_it_misses_change_nothing() -> None:
+def test_whom_it_does_not_want_and_what_chance_it_misses_change_nothing():
     alone = path(run(home_with([PATROL])), "astro")
     for fields in ({"users": ["ben"]}, {"chance": 0}):
         content = home_with([{"type": "opportunistic", **fields}, PATROL])
@@ -53,7 +51,7 @@ def test_whom_it_does_not_want_and_what_chance_it_misses_change_nothing() -> Non
         assert np.array_equal(alone.heading, other.heading)
 
 
-def test_a_cooldown_holds_for_everybody() -> None:
+def test_a_cooldown_holds_for_everybody():
     first = {"type": "opportunistic", "again": 0, "cooldown": "30 min"}
     stored = assert_same_for_every_max_span(home_with([first, PATROL], "2 h"), 61)
     steps = [step for step, name, _ in events(stored) if name == "approaches"]
@@ -63,7 +61,7 @@ def test_a_cooldown_holds_for_everybody() -> None:
         assert begun - ended >= 1800
 
 
-def test_a_robot_without_a_camera_is_refused() -> None:
+def test_a_robot_without_a_camera_is_refused():
     content = home_with(["opportunistic"], astro={"camera": None})
     with pytest.raises(InputError, match=r"robots\.astro.*no camera"):
         fleet2d.Simulation(content)
@@ -77,6 +75,6 @@ def test_a_robot_without_a_camera_is_refused() -> None:
         ({"interaction": "-1 s"}, "0 or more"),
     ],
 )
-def test_bad_settings_are_refused(fields: dict[str, Any], words: str) -> None:
+def test_bad_settings_are_refused(fields, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(home_with([{"type": "opportunistic", **fields}]))

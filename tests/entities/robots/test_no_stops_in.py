@@ -38,18 +38,18 @@ def inside(behavior: str, avoid: list[str]) -> int:
 
 
 @pytest.mark.parametrize("behavior", BEHAVIORS)
-def test_the_robot_stays_out_of_the_rooms_that_it_avoids(behavior: str) -> None:
+def test_the_robot_stays_out_of_the_rooms_that_it_avoids(behavior):
     assert inside(behavior, []) > 0
     assert 0 == inside(behavior, ["kitchen", "bathroom"])  # the way there leads through the kitchen
 
 
-def test_an_unknown_room_is_refused_and_a_kind_that_the_home_lacks_is_noted() -> None:
+def test_an_unknown_room_is_refused_and_a_kind_that_the_home_lacks_is_noted():
     with pytest.raises(PlacementError, match=r"patrol\.no_stops_in: .*did you mean 'kitchen'"):
         inside("patrol", ["kitchn"])
     assert inside("patrol", ["office"]) > 0
 
 
-def test_a_robot_called_into_a_room_that_it_avoids_waits_near_the_door() -> None:
+def test_a_robot_called_into_a_room_that_it_avoids_waits_near_the_door():
     """The door from the living room to the kitchen is at x = 5 m, y = 2.6 to 3.6 m."""
     simulation = fleet2d.Simulation(
         scenario(robots={"astro": {"start": [1.0, 1.0], "behaviors": [{"type": "come", "no_stops_in": ["kitchen"]}]}})
@@ -65,7 +65,7 @@ CHARGER = {"driving": "2 h", "standing": "9 h", "charging": "3 h", "charger": [2
 
 
 @pytest.fixture
-def loop(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+def loop(monkeypatch, tmp_path):
     """The flat with one more door, from the bathroom to the bedroom: two ways lead to a charger."""
     monkeypatch.setattr("tests.scenes.DOORS", [*DOORS, (4, 5, 4.1, 6)])
     return write_flat(tmp_path)
@@ -85,18 +85,18 @@ def docking(plan: Path, **dock: Any) -> set[str]:
     return {"kitchen_1", "bedroom_1"} & set(rows["room"].astype(str))
 
 
-def test_the_way_to_the_charger_leads_round_rooms_to_avoid_if_there_is_another(loop: Path) -> None:
+def test_the_way_to_the_charger_leads_round_rooms_to_avoid_if_there_is_another(loop):
     assert {"bedroom_1"} == docking(loop)
     assert {"kitchen_1"} == docking(loop, no_stops_in=["bedroom"])
     assert {"bedroom_1"} == docking(loop, no_stops_in=["kitchen", "bedroom"])
 
 
-def test_a_charger_in_a_room_to_avoid_is_refused(loop: Path) -> None:
+def test_a_charger_in_a_room_to_avoid_is_refused(loop):
     with pytest.raises(ScenarioError, match=r"dock\.no_stops_in has the room of the charger"):
         docking(loop, no_stops_in=["living_room"])
 
 
-def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note() -> None:
+def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note():
     visits = [{"at": "07:01", "place": "kitchen"}, {"at": "07:02", "place": "bedroom"}]
     robot = {"behaviors": [{"type": "scheduled", "visits": visits, "no_stops_in": ["kitchen"]}]}
     simulation = fleet2d.Simulation(scenario(robots={"astro": robot}))
@@ -105,7 +105,7 @@ def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note() -> None:
     assert ["bedroom_1"] == table(simulation.run(), "events", event="visits")["detail"].tolist()
 
 
-def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data: Path) -> None:
+def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data):
     file = shared_data / "valetudo" / "dreame_z10_named_rooms_and_paths.json"
 
     def points(avoid: list[str]) -> int:

@@ -42,7 +42,7 @@ def room_names(stored: Run) -> list[str]:
     return [stored.plan.room_at(x, y).name for x, y, _ in stops(stored)]  # type: ignore[union-attr]
 
 
-def test_it_stops_in_every_room_in_turn_for_the_dwell() -> None:
+def test_it_stops_in_every_room_in_turn_for_the_dwell():
     stored = run(patrol(rooms=["kitchen", "bathroom_1", "living_room"], look_around=False))
     visited = room_names(stored)
     assert len(visited) > 20
@@ -51,32 +51,32 @@ def test_it_stops_in_every_room_in_turn_for_the_dwell() -> None:
         assert 60 <= count <= 62, (x, y)
 
 
-def test_all_rooms_are_those_that_it_can_enter() -> None:
+def test_all_rooms_are_those_that_it_can_enter():
     names = room_names(run(patrol()))
     assert set(REACHABLE) <= set(names) <= {*REACHABLE, "unknown_1"}
     assert names[: len(set(names))] == sorted(set(names), key=names.index)
 
 
-def test_it_stops_at_the_same_place_of_a_room_each_round() -> None:
+def test_it_stops_at_the_same_place_of_a_room_each_round():
     places = stops(run(patrol(rooms=["kitchen", "bedroom"])))
     assert 2 == len({place[:2] for place in places})
     assert len(places) > 10
 
 
-def test_it_stands_at_the_middle_of_a_room() -> None:
+def test_it_stands_at_the_middle_of_a_room():
     stored = run(patrol("10 min", rooms=["bedroom"]))
     (x, y), *_ = [place[:2] for place in stops(stored)]
     assert (x, y) == pytest.approx(stored.plan.room("bedroom_1").anchor_xy, abs=0.1)
 
 
-def test_waypoints_are_met_exactly() -> None:
+def test_waypoints_are_met_exactly():
     points = [(1.0, 1.0), (7.0, 1.0), (7.0, 6.0)]
     places = [place[:2] for place in stops(run(patrol(waypoints=points, look_around=False)))]
     for place, expected in zip(places[:6], points * 2, strict=True):
         assert place == pytest.approx(expected, abs=1e-3)
 
 
-def test_a_look_around_is_one_whole_turn() -> None:
+def test_a_look_around_is_one_whole_turn():
     content = patrol("3 min", waypoints=[[1.0, 3.0]], turn_rate_deg=36)
     poses = path(run(content), "astro")
     # It is there already: 10 s for the turn, then a minute, and so on.
@@ -89,7 +89,7 @@ def test_a_look_around_is_one_whole_turn() -> None:
     assert 1 == len(set(still.heading.tolist()))
 
 
-def test_random_order_visits_all_in_each_round_in_changing_order() -> None:
+def test_random_order_visits_all_in_each_round_in_changing_order():
     points = [[1, 1], [7, 1], [7, 6], [1, 6], [4, 3]]
     stored = run(patrol("3 h", waypoints=points, order="random", look_around=False))
     # The last of a round may be the first of the next: then it stays twice as long.
@@ -101,7 +101,7 @@ def test_random_order_visits_all_in_each_round_in_changing_order() -> None:
     assert len({tuple(r) for r in rounds}) > 5
 
 
-def test_a_room_named_twice_is_visited_once_a_round() -> None:
+def test_a_room_named_twice_is_visited_once_a_round():
     names = room_names(run(patrol(rooms=["kitchen", ["kitchen_1", "any"], "bedroom"])))
     assert ["kitchen_1", "bedroom_1"] * 2 == names[:4]
 
@@ -117,7 +117,7 @@ def bent(**fields: Any) -> dict[str, Any]:
     }
 
 
-def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does() -> None:
+def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does():
     """In one of forty homes presence erred by a third: the bed was never in view."""
     by_middle = fleet2d.Simulation(bent()).actors["astro"]
     (note,) = by_middle.notes
@@ -128,13 +128,13 @@ def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does() -> N
     assert len(by_view.behaviors[0].stops) >= len(by_middle.behaviors[0].stops)
 
 
-def test_a_robot_that_also_does_something_else_is_not_warned() -> None:
+def test_a_robot_that_also_does_something_else_is_not_warned():
     content = bent()
     content["robots"]["astro"]["behaviors"].append({"type": "hangout"})
     assert [] == fleet2d.Simulation(content).actors["astro"].notes
 
 
-def test_a_round_that_takes_no_time_does_not_hang_the_run() -> None:
+def test_a_round_that_takes_no_time_does_not_hang_the_run():
     content = patrol("1 min", waypoints=[[1.0, 3.0]], dwell=0, look_around=False)
     assert 60 == run(content).manifest["steps"]
 
@@ -154,9 +154,7 @@ def test_a_round_that_takes_no_time_does_not_hang_the_run() -> None:
         ({"waypoints": [[1.0, 1.0, 0.0]]}, ["waypoints.0"]),
     ],
 )
-def test_rounds_that_can_not_be_made_are_refused_before_the_run(
-    fields: dict[str, Any], words: list[str]
-) -> None:
+def test_rounds_that_can_not_be_made_are_refused_before_the_run(fields, words):
     with pytest.raises(InputError) as caught:
         fleet2d.Simulation(patrol(**fields))
     for word in words:

@@ -26,7 +26,7 @@ def vacuum(file: Path, duration: str = "3 h", **fields: Any) -> dict[str, Any]:
     return content
 
 
-def test_it_drives_where_the_vacuum_drove(shared_data: Path) -> None:
+def test_it_drives_where_the_vacuum_drove(shared_data):
     file = shared_data / "valetudo" / MAP
     stored = run(vacuum(file))
     assert ["retraces", "retraced"] == names(stored)[:2]
@@ -38,13 +38,11 @@ def test_it_drives_where_the_vacuum_drove(shared_data: Path) -> None:
     assert np.quantile(gaps, 0.95) < 0.6
 
 
-def test_the_same_for_every_max_span(shared_data: Path) -> None:
+def test_the_same_for_every_max_span(shared_data):
     assert_same_for_every_max_span(vacuum(shared_data / "valetudo" / MAP, "20 min"), 61)
 
 
-def test_a_map_without_a_path_and_one_of_another_home_are_refused(
-    shared_data: Path, tmp_path: Path
-) -> None:
+def test_a_map_without_a_path_and_one_of_another_home_are_refused(shared_data, tmp_path):
     file, bare = shared_data / "valetudo" / MAP, tmp_path / "bare.json"
     content = json.loads(file.read_text())
     content["entities"] = [e for e in content["entities"] if e["type"] != "path"]
@@ -56,7 +54,7 @@ def test_a_map_without_a_path_and_one_of_another_home_are_refused(
         fleet2d.Simulation(content)
 
 
-def test_a_file_that_is_no_map_says_whose_it_is_and_what_reads_logs(tmp_path: Path) -> None:
+def test_a_file_that_is_no_map_says_whose_it_is_and_what_reads_logs(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("time,x,y\n0,1.0,3.0\n")
     with pytest.raises(InputError, match=r"robots\.astro: .*log\.csv is a table.*'replay'"):
@@ -65,7 +63,7 @@ def test_a_file_that_is_no_map_says_whose_it_is_and_what_reads_logs(tmp_path: Pa
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 @pytest.mark.parametrize("with_heading", [False, True])
-def test_a_log_with_times_is_for_replay(tmp_path: Path, with_heading: bool, suffix: str) -> None:
+def test_a_log_with_times_is_for_replay(tmp_path, with_heading, suffix):
     rows = [(t, 1.0 + 0.1 * t, 3.0, 1.5708) for t in range(30)]
     head = "time,x,y,heading" if with_heading else "time,x,y"
     lines = [",".join(map(str, row if with_heading else row[:3])) for row in rows]

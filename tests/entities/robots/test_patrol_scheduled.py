@@ -1,7 +1,6 @@
 """Scheduled: visits at times of the day, between which others have their way."""
 
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, rooms
@@ -18,7 +17,7 @@ VISITS = [
 REST = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "1 d", "look_around": False}
 
 
-def test_visits_are_made_at_their_times_and_days() -> None:
+def test_visits_are_made_at_their_times_and_days():
     content = home_with([{"type": "scheduled", "visits": VISITS}, REST])
     stored = assert_same_for_every_max_span(content)
     rows = [(step, detail) for step, name, detail in events(stored) if name == "visits"]
@@ -30,14 +29,14 @@ def test_visits_are_made_at_their_times_and_days() -> None:
     )
 
 
-def test_visits_are_made_anew_every_day() -> None:
+def test_visits_are_made_anew_every_day():
     stored = run(home_with([{"type": "scheduled", "visits": VISITS[:1]}, REST], "3 d"))
     steps = [step for step, name, _ in events(stored) if name == "visits"]
     assert 3 == len(steps)
     assert {86400} == {b - a for a, b in pairwise(steps)}
 
 
-def test_who_may_not_break_in_waits_and_leaves_out_what_is_too_late() -> None:
+def test_who_may_not_break_in_waits_and_leaves_out_what_is_too_late():
     patient = {"type": "scheduled", "visits": VISITS[:2], "preempts": False, "late": "12 min"}
     busy = {"type": "patrol", "waypoints": [[1.0, 3.0]], "dwell": "20 min", "look_around": False}
     stored = run(home_with([patient, busy]))
@@ -50,9 +49,7 @@ GATE = {"gate": {"type": "door", "doorway": "living_room_1-kitchen_1"}}
 
 
 @pytest.mark.parametrize(("opens", "visited"), [("07:25", True), ("07:50", False)])
-def test_a_visit_behind_a_shut_door_is_made_once_it_is_open_or_left_out(
-    opens: str, visited: bool
-) -> None:
+def test_a_visit_behind_a_shut_door_is_made_once_it_is_open_or_left_out(opens, visited):
     agenda = [{"at": "07:00", "open": False}, {"at": opens, "open": True}]
     content = home_with(
         [{"type": "scheduled", "visits": VISITS[:1]}, REST],
@@ -77,6 +74,6 @@ def test_a_visit_behind_a_shut_door_is_made_once_it_is_open_or_left_out(
         ([{"at": "07:00", "place": "kitchen", "on": "someday"}], "on"),
     ],
 )
-def test_visits_that_can_not_be_made_are_refused(visits: list[Any], words: str) -> None:
+def test_visits_that_can_not_be_made_are_refused(visits, words):
     with pytest.raises(InputError, match=words):
         fleet2d.Simulation(home_with([{"type": "scheduled", "visits": visits}]))

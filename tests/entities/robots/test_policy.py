@@ -72,7 +72,7 @@ def lives(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[F32]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["hangout", "find", "patrol"])
-def test_a_run_with_a_policy_is_the_same_for_every_max_span(task: str) -> None:
+def test_a_run_with_a_policy_is_the_same_for_every_max_span(task):
     stored = assert_same_for_every_max_span(home_with([policy(task, every="20 min")], "90 min"))
 
     assert {"hangout": "relocates", "find": "find_begins", "patrol": "visits"}[task] in names(
@@ -81,14 +81,14 @@ def test_a_run_with_a_policy_is_the_same_for_every_max_span(task: str) -> None:
 
 
 @pytest.mark.parametrize("task", ["hangout", "find", "patrol"])
-def test_actions_from_outside_repeat_the_run_of_the_policy(task: str) -> None:
+def test_actions_from_outside_repeat_the_run_of_the_policy(task):
     content = home_with([policy(task, every="20 min")], "90 min")
     simulation, _ = lives(content, lambda behavior, table, mask: behavior.act(table, mask))
 
     assert run(content).digest == simulation.finish().digest
 
 
-def test_what_was_never_perceived_is_not_in_observations() -> None:
+def test_what_was_never_perceived_is_not_in_observations():
     """Two lives that differ only in where somebody is whom the robot never sees."""
     blind = {"camera": {"range": [0.2, 0.21], "angle_deg": 1}}
     places = ([7.0, 6.0], "bedroom")
@@ -104,7 +104,7 @@ def test_what_was_never_perceived_is_not_in_observations() -> None:
     assert np.array_equal(*map(np.stack, ways))
 
 
-def test_what_was_perceived_is_in_observations() -> None:
+def test_what_was_perceived_is_in_observations():
     bathroom = "bathroom_1"
     simulation = Simulation(home_with([policy()], "2 h"))
     room = simulation.home.plan.room(bathroom).index
@@ -117,7 +117,7 @@ def test_what_was_perceived_is_in_observations() -> None:
     assert 1 == tables[2][room, AT["here"]] == tables[2][:, AT["here"]].sum()
 
 
-def test_observation_describes_the_home_and_pads_it() -> None:
+def test_observation_describes_the_home_and_pads_it():
     table = lives(home_with([policy(rooms=9)], "30 min"), lambda *_: 0)[1][0]
     home = Simulation(home_with([policy()])).home
 
@@ -133,7 +133,7 @@ def test_observation_describes_the_home_and_pads_it() -> None:
     assert np.abs(table).max() <= 1
 
 
-def test_rooms_without_a_way_are_masked_and_rest_is_always_possible() -> None:
+def test_rooms_without_a_way_are_masked_and_rest_is_always_possible():
     masks = []
     lives(home_with([policy()], "30 min"), lambda _, __, mask: masks.append(mask) or 16)
     storage = Simulation(home_with([policy()])).home.plan.room("storage_1").index
@@ -146,7 +146,7 @@ def test_rooms_without_a_way_are_masked_and_rest_is_always_possible() -> None:
     ("action", "reason"),
     [(4, "can't be reached"), (7, "doesn't exist"), (17, "from 0 to 16"), (-1, "from 0 to 16")],
 )
-def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str) -> None:
+def test_impossible_action_is_an_error_with_the_reason(action, reason):
     home = Simulation(home_with([policy()])).home
     action = home.plan.room("storage_1").index if action == 4 else action
     with pytest.raises(ComponentError, match=f"robots.astro failed at step 0.*{reason}"):
@@ -160,29 +160,29 @@ def test_impossible_action_is_an_error_with_the_reason(action: int, reason: str)
         behavior.check(now, action, behavior.mask(now))
 
 
-def test_policy_without_a_file_says_what_to_give() -> None:
+def test_policy_without_a_file_says_what_to_give():
     with pytest.raises(ComponentError, match=r"file: hangout\.onnx"):
         run(home_with([{"type": "policy"}]))
 
 
-def test_file_of_another_kind_is_refused(tmp_path: Any) -> None:
+def test_file_of_another_kind_is_refused(tmp_path):
     path = tmp_path / "net.pt"
     path.touch()
     with pytest.raises(ScenarioError, match=r"suffix \.onnx, got net\.pt"):
         Simulation(home_with([{"type": "policy", "file": str(path)}]))
 
 
-def test_home_with_more_rooms_than_observations_is_refused() -> None:
+def test_home_with_more_rooms_than_observations_is_refused():
     with pytest.raises(PlacementError, match=r"6 rooms.*set rooms: 6"):
         Simulation(home_with([policy(rooms=4)]))
 
 
-def test_robot_without_camera_is_refused() -> None:
+def test_robot_without_camera_is_refused():
     with pytest.raises(ScenarioError, match="has no camera"):
         Simulation(home_with([policy()], astro={"camera": None}))
 
 
-def test_search_ends_when_the_person_is_found_or_the_deadline_is_over() -> None:
+def test_search_ends_when_the_person_is_found_or_the_deadline_is_over():
     found = run(home_with([policy("find", every="20 min")], "30 min"))
     lost = run(home_with([policy("find", every="20 min", deadline="3 min")], "30 min", ana=OUT))
 
@@ -190,7 +190,7 @@ def test_search_ends_when_the_person_is_found_or_the_deadline_is_over() -> None:
     assert ["find_begins", "gave_up"] * 2 == names(lost)
 
 
-def test_who_was_interrupted_close_to_a_corner_may_still_go_to_all_rooms() -> None:
+def test_who_was_interrupted_close_to_a_corner_may_still_go_to_all_rooms():
     """The middle of its cell wasn't free, so that no room had a way, and all were masked."""
     simulation = Simulation(home_with([policy()], "1 h"))
     run_until_asked(simulation, "astro")
@@ -211,7 +211,7 @@ def test_who_was_interrupted_close_to_a_corner_may_still_go_to_all_rooms() -> No
     assert free.tolist() == behavior.poses.ways(17).mask.tolist()
 
 
-def test_last_action_of_a_search_gives_it_up() -> None:
+def test_last_action_of_a_search_gives_it_up():
     content = home_with([fixed(16, task="find", every="20 min")], "30 min", ana=OUT)
 
     assert [(0, "find_begins"), (0, "gave_up"), (1200, "find_begins"), (1200, "gave_up")] == [
@@ -219,7 +219,7 @@ def test_last_action_of_a_search_gives_it_up() -> None:
     ]
 
 
-def test_empty_battery_ends_all_decisions_and_rest_charges() -> None:
+def test_empty_battery_ends_all_decisions_and_rest_charges():
     battery = {"driving": "10 min", "standing": "1 h", "charging": "30 min", "charger": "kitchen"}
     content = home_with([policy("patrol", dwell="1 s")], "4 h", astro={"battery": battery})
     away, _ = lives(content, lambda b, table, mask: b.act(table, mask))
@@ -231,7 +231,7 @@ def test_empty_battery_ends_all_decisions_and_rest_charges() -> None:
     assert min(charges) > 0.9
 
 
-def test_order_is_carried_out_without_asking_the_policy() -> None:
+def test_order_is_carried_out_without_asking_the_policy():
     simulation = Simulation(home_with([policy()], "1 h"))
     simulation.do(Send("astro", "bedroom", duration="30 min"))
 
@@ -239,7 +239,7 @@ def test_order_is_carried_out_without_asking_the_policy() -> None:
     assert simulation.step >= 1800
 
 
-def test_memory_counts_looks_by_room_hour_and_person() -> None:
+def test_memory_counts_looks_by_room_hour_and_person():
     plan = fleet2d.load_floorplan("family_home")
     memory = SightingMemory(plan, 2, Clock(datetime(2026, 1, 5, 7, 59), 1_000_000, 3600))
     row, column = np.argwhere(plan.room_of_cell >= 0)[0]
@@ -259,7 +259,7 @@ def test_memory_counts_looks_by_room_hour_and_person() -> None:
     assert [3, 0, 1, 4] == memory.rooms.total[:, room].tolist()
 
 
-def test_a_robot_that_was_off_remembers_no_sightings() -> None:
+def test_a_robot_that_was_off_remembers_no_sightings():
     act = {"at": "08:00", "power": "astro", "state": "crash"}
     content = home_with([policy()], "3 h")
     content["script"] = [act]
@@ -274,7 +274,7 @@ def test_a_robot_that_was_off_remembers_no_sightings() -> None:
     assert int(memory.rooms[0].max()) > 3660
 
 
-def test_memory_counts_looks_by_the_hour_that_the_clock_reads() -> None:
+def test_memory_counts_looks_by_the_hour_that_the_clock_reads():
     """Four hours over the night in which it reads an hour twice: a look each minute."""
     plan = fleet2d.load_floorplan("family_home")
     zone = zone_of("Europe/Berlin", datetime(2026, 10, 24), datetime(2026, 10, 26))

@@ -48,14 +48,14 @@ def problems(draw: Any, most: int = 6) -> SearchProblem:
 
 @given(problems())
 @settings(max_examples=examples(60))
-def test_exact_order_is_the_best_of_all_orders(problem: SearchProblem) -> None:
+def test_exact_order_is_the_best_of_all_orders(problem):
     costs = [play(problem, order).cost for order in permutations(range(len(problem.prior)))]
     assert play(problem, exact(problem)).cost == pytest.approx(min(costs), abs=1e-9)
 
 
 @given(problems(most=10))
 @settings(max_examples=examples(60))
-def test_exact_order_is_never_beaten_by_a_heuristic(problem: SearchProblem) -> None:
+def test_exact_order_is_never_beaten_by_a_heuristic(problem):
     best = play(problem, exact(problem)).cost
     for policy in HEURISTICS:
         assert best <= play(problem, policy(problem)).cost + 1e-9
@@ -64,7 +64,7 @@ def test_exact_order_is_never_beaten_by_a_heuristic(problem: SearchProblem) -> N
 
 @given(problems(most=5))
 @settings(max_examples=examples(60))
-def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem: SearchProblem) -> None:
+def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem):
     """Wherever the target is, and whichever looks would miss it: an account of its own."""
     order = exact(problem)
     mean, success = 0.0, 0.0
@@ -86,7 +86,7 @@ def test_the_cost_of_an_order_is_the_mean_over_all_that_can_happen(problem: Sear
 
 @given(problems(most=7))
 @settings(max_examples=examples(40))
-def test_what_is_left_of_an_exact_order_is_exact_from_there(problem: SearchProblem) -> None:
+def test_what_is_left_of_an_exact_order_is_exact_from_there(problem):
     """Bellman's principle: to decide anew after an empty look gives the same, if nobody moves."""
     order = exact(problem)
     first, rest = order[0], sorted(order[1:])
@@ -101,7 +101,7 @@ def test_what_is_left_of_an_exact_order_is_exact_from_there(problem: SearchProbl
     assert play(after, exact(after)).cost == pytest.approx(play(after, went_on).cost, abs=1e-9)
 
 
-def test_searches_with_nothing_or_little_to_choose_from() -> None:
+def test_searches_with_nothing_or_little_to_choose_from():
     nowhere = search_problem([0, 0, 0], [3, 1, 2], np.ones((3, 3)))
     assert 0 == play(nowhere, exact(nowhere)).cost
     assert [0, 1, 2] == exact(nowhere) == likeliest_first(nowhere)  # ties go to the lower site
@@ -117,7 +117,7 @@ def test_searches_with_nothing_or_little_to_choose_from() -> None:
         assert [] == policy(empty)
 
 
-def test_a_site_without_a_way_comes_last_however_likely_it_is() -> None:
+def test_a_site_without_a_way_comes_last_however_likely_it_is():
     day = 86_400.0
     travel = np.array([[0, 5, day], [5, 0, day], [day, day, 0]])
     problem = search_problem([0.05, 0.05, 0.9], [5, 6, day], travel)
@@ -125,7 +125,7 @@ def test_a_site_without_a_way_comes_last_however_likely_it_is() -> None:
     assert 2 == likeliest_first(problem)[0]  # which is why find drops those that it can't go to
 
 
-def test_a_site_where_nobody_is_waits_until_all_others_are_done() -> None:
+def test_a_site_where_nobody_is_waits_until_all_others_are_done():
     travel = np.array([[0, 1, 9], [1, 0, 9], [9, 9, 0]])
     problem = search_problem([0.5, 0.0, 0.5], [1, 1, 9], travel, look=3)
     assert [0, 2, 1] == exact(problem)
@@ -133,7 +133,7 @@ def test_a_site_where_nobody_is_waits_until_all_others_are_done() -> None:
 
 @given(problems(most=10))
 @settings(max_examples=examples(60))
-def test_every_policy_looks_at_every_site_once(problem: SearchProblem) -> None:
+def test_every_policy_looks_at_every_site_once(problem):
     sites = list(range(len(problem.prior)))
     for name in ("random", "nearest", "likeliest", "greedy", "exact", "receding"):
         assert sites == sorted(order_by(name, problem, DRAWS))  # type: ignore[arg-type]
@@ -141,11 +141,11 @@ def test_every_policy_looks_at_every_site_once(problem: SearchProblem) -> None:
 
 @given(problems(most=8))
 @settings(max_examples=examples(40))
-def test_a_horizon_that_holds_all_sites_is_exact(problem: SearchProblem) -> None:
+def test_a_horizon_that_holds_all_sites_is_exact(problem):
     assert exact(problem) == receding(problem, horizon=8)
 
 
-def test_each_heuristic_goes_by_what_it_says() -> None:
+def test_each_heuristic_goes_by_what_it_says():
     travel = np.full((3, 3), 10.0)
     problem = search_problem([0.1, 0.3, 0.6], [1, 4, 30], travel)
     assert 0 == nearest_first(problem)[0]
@@ -153,7 +153,7 @@ def test_each_heuristic_goes_by_what_it_says() -> None:
     assert 0 == greedy(problem)[0]  # 0.1 a second, beside 0.075 and 0.02
 
 
-def test_looks_that_may_miss_can_be_repeated() -> None:
+def test_looks_that_may_miss_can_be_repeated():
     problem = search_problem([0.8], [10], [[0]], look=5, detect=0.5)
     outcome = play(problem, [0, 0, 0])
     assert [15.0, 20.0, 25.0] == outcome.time
@@ -161,7 +161,7 @@ def test_looks_that_may_miss_can_be_repeated() -> None:
     assert outcome.success == pytest.approx(0.7)
 
 
-def test_sixteen_sites_are_solved_and_more_are_refused() -> None:
+def test_sixteen_sites_are_solved_and_more_are_refused():
     rng = np.random.default_rng(4)
     places = rng.uniform(0, 10, (MAX_EXACT_SITES + 1, 2))
     travel = np.sqrt(((places[:, None] - places[None]) ** 2).sum(axis=-1))
@@ -179,7 +179,7 @@ def test_sixteen_sites_are_solved_and_more_are_refused() -> None:
     assert sorted(receding(problem)) == list(range(MAX_EXACT_SITES + 1))
 
 
-def test_an_empty_look_fades_with_its_age() -> None:
+def test_an_empty_look_fades_with_its_age():
     prior = np.array([0.5, 0.5])
     fresh = after_empty_looks(prior, np.array([0.0, np.inf]), 600, 0.8)
     older = after_empty_looks(prior, np.array([600.0, np.inf]), 600, 0.8)
@@ -199,7 +199,7 @@ def test_an_empty_look_fades_with_its_age() -> None:
         ({"look": float("nan")}, "look has a value"),
     ],
 )
-def test_problems_that_make_no_sense_are_refused(fields: dict[str, Any], words: str) -> None:
+def test_problems_that_make_no_sense_are_refused(fields, words):
     usual: dict[str, Any] = {"prior": [0.5, 0.5], "reach": [1, 1], "travel": np.ones((2, 2))}
     with pytest.raises(ValueError, match=words):
         search_problem(**{**usual, **fields})

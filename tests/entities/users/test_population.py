@@ -33,7 +33,7 @@ def apart(counts: Counter[str], target: dict[str, float]) -> float:
 
 
 @pytest.mark.slow
-def test_shares_of_many_people_follow_the_survey_hour_by_hour() -> None:
+def test_shares_of_many_people_follow_the_survey_hour_by_hour():
     simulation = Simulation(
         scenario("5 min", users=users(1000 if THOROUGH else 300, group="workers"))
     )
@@ -55,7 +55,7 @@ def test_shares_of_many_people_follow_the_survey_hour_by_hour() -> None:
     assert max(distances) < 0.10
 
 
-def test_days_follow_each_other_without_a_gap() -> None:
+def test_days_follow_each_other_without_a_gap():
     actor = Simulation(scenario("5 min", users=users(1))).actors["user_0"]
     days = [actor.behaviors[0].day(MONDAY + i) for i in range(20)]
     for day, after in pairwise(days):
@@ -65,7 +65,7 @@ def test_days_follow_each_other_without_a_gap() -> None:
         assert 4 * HOUR == after[0].begin
 
 
-def test_hardly_a_day_of_the_retired_has_no_meal_at_home() -> None:
+def test_hardly_a_day_of_the_retired_has_no_meal_at_home():
     """Without what the survey doesn't record, as eating in front of the television, 29 % had none."""
     simulation = Simulation(scenario("5 min", users=users(40, group="retired")))
     meals = [
@@ -80,7 +80,7 @@ def test_hardly_a_day_of_the_retired_has_no_meal_at_home() -> None:
     assert 2 < statistics.mean(meals) < 3
 
 
-def test_an_hour_of_television_lasts_as_long_as_in_the_survey() -> None:
+def test_an_hour_of_television_lasts_as_long_as_in_the_survey():
     group = survey.group("retired")
     lasted = []
     for person in range(60):
@@ -95,7 +95,7 @@ def test_an_hour_of_television_lasts_as_long_as_in_the_survey() -> None:
     assert statistics.pstdev(lasted) < 0.9 * statistics.mean(lasted)
 
 
-def test_asking_for_a_day_again_or_from_a_branch_gives_the_same() -> None:
+def test_asking_for_a_day_again_or_from_a_branch_gives_the_same():
     simulation = Simulation(scenario("5 min", users=users(1)))
     behavior = simulation.actors["user_0"].behaviors[0]
     third = behavior.day(MONDAY + 3)
@@ -104,7 +104,7 @@ def test_asking_for_a_day_again_or_from_a_branch_gives_the_same() -> None:
     assert third == behavior.day(MONDAY + 3)
 
 
-def test_groups_are_drawn_by_their_shares() -> None:
+def test_groups_are_drawn_by_their_shares():
     simulation = Simulation(scenario("5 min", users=users(200)))
     drawn = Counter(a.behaviors[0].people.name for a in simulation.actors.values())
     for name in survey.groups():
@@ -112,19 +112,19 @@ def test_groups_are_drawn_by_their_shares() -> None:
         assert share == pytest.approx(drawn[name] / 200, abs=0.08)
 
 
-def test_people_of_the_survey_live_in_the_home() -> None:
+def test_people_of_the_survey_live_in_the_home():
     stored = run(scenario("3 d", users=users(3, group="at_home")))
     details = set(table(stored, "events", event="activity")["detail"])
     assert {"sleep", "cook", "tv", "toilet", "wash_hands", "drink"} <= details
     assert timedelta(days=3).total_seconds() == stored.manifest["steps"]
 
 
-def test_a_group_that_is_none_is_refused() -> None:
+def test_a_group_that_is_none_is_refused():
     with pytest.raises(InputError, match=r"users\.user_0\.group"):
         Simulation(scenario(users=users(1, group="teens")))
 
 
-def test_the_table_is_whole() -> None:
+def test_the_table_is_whole():
     assert sum(facts["share"] for facts in survey.table()["groups"].values()) == 10_000
     for facts in survey.table()["groups"].values():
         for kind in ("weekday", "weekend"):

@@ -37,7 +37,7 @@ def apart(stored: Any) -> np.ndarray:
     return np.sqrt((ana.x - astro.x) ** 2 + (ana.y - astro.y) ** 2)
 
 
-def test_who_notices_a_robot_turns_to_it_once_and_looks() -> None:
+def test_who_notices_a_robot_turns_to_it_once_and_looks():
     stored = run(meets([[5.5, 2.0], 200], turns=1, looks="20 s"))
     assert ["turns to astro"] == reacts(stored)
     ana, astro = path(stored, "ana"), path(stored, "astro")
@@ -47,26 +47,26 @@ def test_who_notices_a_robot_turns_to_it_once_and_looks() -> None:
     assert abs((ana.heading[step + 5] - to_it + np.pi) % (2 * np.pi) - np.pi) < 0.01
 
 
-def test_a_robot_behind_a_wall_is_not_noticed() -> None:
+def test_a_robot_behind_a_wall_is_not_noticed():
     # 1.5 m apart, in the bedroom and the bathroom
     stored = run(meets([[3.4, 5.6], 100], at=[4.8, 5.6], turns=1))
     assert apart(stored).min() < 2.0
     assert [] == reacts(stored)
 
 
-def test_a_robot_that_comes_again_is_noticed_again() -> None:
+def test_a_robot_that_comes_again_is_noticed_again():
     stored = run(meets([[5.5, 2.0], 5, FAR_OFF, [5.5, 2.0], 60], turns=1, looks="2 s"))
     assert ["turns to astro"] * 2 == reacts(stored)
 
 
-def test_who_is_in_the_way_steps_aside() -> None:
+def test_who_is_in_the_way_steps_aside():
     stored = run(meets([[7.5, 2.0], 60], steps_aside=1))
     assert ["steps aside for astro"] == reacts(stored)
     ana = path(stored, "ana")
     assert 0.7 == pytest.approx(np.hypot(ana.x[-1] - HERE[0], ana.y[-1] - HERE[1]), abs=0.02)
 
 
-def test_who_has_a_robot_too_close_leaves_when_patience_is_over() -> None:
+def test_who_has_a_robot_too_close_leaves_when_patience_is_over():
     stored = run(meets([[6.0, 2.0], 250], leaves=1, patience="40 s"))
     assert ["leaves astro"] == reacts(stored)
     close = np.flatnonzero(apart(stored) <= 0.7)
@@ -76,12 +76,12 @@ def test_who_has_a_robot_too_close_leaves_when_patience_is_over() -> None:
     assert ana.room[step - 1] != ana.room[-1]
 
 
-def test_a_robot_that_goes_on_in_time_is_put_up_with() -> None:
+def test_a_robot_that_goes_on_in_time_is_put_up_with():
     stored = run(meets([[6.0, 2.0], 30, FAR_OFF], leaves=1, patience="40 s"))
     assert [] == reacts(stored)
 
 
-def test_who_is_called_comes_and_stays_a_while() -> None:
+def test_who_is_called_comes_and_stays_a_while():
     stored = run(meets([10, "call", 200], comes=1, comes_for="30 s"))
     assert ["comes to astro"] == reacts(stored)
     assert 0.9 == pytest.approx(apart(stored).min(), abs=0.02)
@@ -89,16 +89,16 @@ def test_who_is_called_comes_and_stays_a_while() -> None:
     assert ana.room[-1] == path(stored, "astro").room[-1] != ana.room[0]
 
 
-def test_a_call_at_the_end_of_a_plan_is_heard() -> None:
+def test_a_call_at_the_end_of_a_plan_is_heard():
     stored = run(meets([30, "call"], comes=1))
     assert ["comes to astro"] == reacts(stored)
 
 
-def test_out_of_hearing_nobody_comes() -> None:
+def test_out_of_hearing_nobody_comes():
     assert [] == reacts(run(meets([10, "call", 60], comes=1, hears=2.0)))
 
 
-def test_who_comes_is_not_stopped_by_noticing_the_robot() -> None:
+def test_who_comes_is_not_stopped_by_noticing_the_robot():
     stored = run(meets([10, "call", 200], comes=1, comes_for="1 min", turns=1))
     assert ["comes to astro"] == reacts(stored)
 
@@ -122,7 +122,7 @@ def family(**manners: Any) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_every_table_is_the_same_for_every_max_span() -> None:
+def test_every_table_is_the_same_for_every_max_span():
     lively = family(turns=1, steps_aside=1, leaves=1, comes=1, stops=0.5, patience="5 s")
     stored = run(lively)
     details = table(stored, "events", event="reacts")["detail"]
@@ -131,14 +131,14 @@ def test_every_table_is_the_same_for_every_max_span() -> None:
         assert digests(stored) == digests(run(lively, max_span=span))
 
 
-def test_who_never_reacts_lives_as_if_there_was_no_such_behavior() -> None:
+def test_who_never_reacts_lives_as_if_there_was_no_such_behavior():
     without = family()
     for user in without["users"].values():
         user["behaviors"] = user["behaviors"][1:]
     assert digests(run(without)) == digests(run(family(**NEVER)))
 
 
-def test_a_run_can_branch_in_the_middle_of_a_reaction() -> None:
+def test_a_run_can_branch_in_the_middle_of_a_reaction():
     content = family(turns=1, comes=1, looks="2 min")
     whole = run(content)
     step = int(table(whole, "events", event="reacts")["step"][0]) + 3
@@ -148,7 +148,7 @@ def test_a_run_can_branch_in_the_middle_of_a_reaction() -> None:
     assert whole.digest == simulation.run().digest == twin.run().digest
 
 
-def test_after_a_reaction_one_goes_on_with_what_one_did() -> None:
+def test_after_a_reaction_one_goes_on_with_what_one_did():
     day = {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}
     activity = {"needs": {}, "errands": {}, "days": {"any_day": day}}
     content = meets(["living_room", 200], turns=1, looks="20 s", notices=6)
@@ -161,7 +161,7 @@ def test_after_a_reaction_one_goes_on_with_what_one_did() -> None:
     assert {"read"} == set(table(stored, "events", entity="ana", event="activity")["detail"])
 
 
-def test_who_gives_up_what_it_did_rests() -> None:
+def test_who_gives_up_what_it_did_rests():
     day = {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}
     activity = {"needs": {}, "errands": {}, "days": {"any_day": day}}
     content = meets([30, "call", 200], comes=1, stops=1, comes_for="20 s")
@@ -172,7 +172,7 @@ def test_who_gives_up_what_it_did_rests() -> None:
     assert ["read", "rest"] == details
 
 
-def test_manners_are_the_personas_unless_given() -> None:
+def test_manners_are_the_personas_unless_given():
     def manners_of(*behaviors: Any) -> Any:
         users = {"ana": {"behaviors": list(behaviors)}}
         return Simulation(scenario(users=users)).actors["ana"].behaviors[0].used_manners
@@ -186,7 +186,7 @@ def test_manners_are_the_personas_unless_given() -> None:
     )
 
 
-def test_what_are_no_manners_is_refused_in_plain_words() -> None:
+def test_what_are_no_manners_is_refused_in_plain_words():
     content = meets([], turns=1.5)
     with pytest.raises(InputError, match=r"users\.ana.*turns"):
         fleet2d.load_scenario(content)

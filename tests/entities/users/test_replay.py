@@ -73,7 +73,7 @@ MORNING = [
 ]
 
 
-def test_at_each_reading_the_body_is_in_its_room(tmp_path: Path) -> None:
+def test_at_each_reading_the_body_is_in_its_room(tmp_path):
     rooms = rooms_of(replay(events(tmp_path, MORNING)))
     for clock, room in [
         ("07:00:00", "bedroom"),
@@ -89,7 +89,7 @@ def test_at_each_reading_the_body_is_in_its_room(tmp_path: Path) -> None:
     assert {None} == set(rooms[at("07:20:01") :])
 
 
-def test_the_report_says_what_was_mapped_dropped_hurried_and_is_unknown(tmp_path: Path) -> None:
+def test_the_report_says_what_was_mapped_dropped_hurried_and_is_unknown(tmp_path):
     content = replay(events(tmp_path, MORNING), rooms={"LivingRoom": None})
     assert [
         "events.txt, layout casas: 7 readings of 1 day from 2020-03-02",
@@ -104,7 +104,7 @@ def test_the_report_says_what_was_mapped_dropped_hurried_and_is_unknown(tmp_path
     assert yielded in notes(run(replay(events(tmp_path, MORNING))))
 
 
-def test_it_walks_at_its_own_speed_where_the_log_leaves_time(tmp_path: Path) -> None:
+def test_it_walks_at_its_own_speed_where_the_log_leaves_time(tmp_path):
     content = replay(
         events(tmp_path, [("07:00:00", "Bedroom", ""), ("07:04:00", "Kitchen", "")]), "5 min"
     )
@@ -116,7 +116,7 @@ def test_it_walks_at_its_own_speed_where_the_log_leaves_time(tmp_path: Path) -> 
     assert moving[-1] - moving[0] < 40
 
 
-def test_intervals_that_abut_are_left_early_and_begin_on_time(tmp_path: Path) -> None:
+def test_intervals_that_abut_are_left_early_and_begin_on_time(tmp_path):
     log = adls(
         tmp_path,
         [
@@ -139,7 +139,7 @@ def test_intervals_that_abut_are_left_early_and_begin_on_time(tmp_path: Path) ->
     ] == events_named(stored, "left_home", "came_home")
 
 
-def test_who_begins_last_holds_and_what_outlasts_it_holds_again(tmp_path: Path) -> None:
+def test_who_begins_last_holds_and_what_outlasts_it_holds_again(tmp_path):
     log = adls(
         tmp_path, [("07:00:00", "07:30:00", "Sleeping"), ("07:10:00", "07:15:00", "Toileting")]
     )
@@ -152,7 +152,7 @@ def test_who_begins_last_holds_and_what_outlasts_it_holds_again(tmp_path: Path) 
 GAP = [("07:00:00", "Bedroom", "Sleep"), ("07:12:00", "Kitchen", "Cook")]
 
 
-def test_a_gap_is_unknown_and_not_made_up(tmp_path: Path) -> None:
+def test_a_gap_is_unknown_and_not_made_up(tmp_path):
     stored = run(replay(events(tmp_path, GAP), "15 min"))
     rooms = rooms_of(replay(events(tmp_path, GAP), "15 min"))
     assert [
@@ -166,7 +166,7 @@ def test_a_gap_is_unknown_and_not_made_up(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("gaps", "middle"), [("hold", "bedroom"), ("walk", "kitchen")])
-def test_a_gap_is_filled_only_if_asked(tmp_path: Path, gaps: str, middle: str) -> None:
+def test_a_gap_is_filled_only_if_asked(tmp_path, gaps, middle):
     rooms = rooms_of(replay(events(tmp_path, GAP), "13 min", gaps=gaps))
     assert ("bedroom", middle, "kitchen") == (
         rooms[0],
@@ -176,13 +176,13 @@ def test_a_gap_is_filled_only_if_asked(tmp_path: Path, gaps: str, middle: str) -
     assert None not in rooms[: at("07:12:00") + 1]
 
 
-def test_silence_in_one_room_is_no_gap_up_to_a_limit(tmp_path: Path) -> None:
+def test_silence_in_one_room_is_no_gap_up_to_a_limit(tmp_path):
     log = events(tmp_path, [("07:00:00", "Bedroom", "Sleep"), ("07:25:00", "Bedroom", "Sleep")])
     assert "bedroom" == rooms_of(replay(log))[at("07:12:00")]
     assert rooms_of(replay(log, still="20 min"))[at("07:12:00")] is None
 
 
-def test_silence_after_the_front_door_until_it_opens_again_is_being_out(tmp_path: Path) -> None:
+def test_silence_after_the_front_door_until_it_opens_again_is_being_out(tmp_path):
     log = events(
         tmp_path,
         [
@@ -212,9 +212,7 @@ def test_silence_after_the_front_door_until_it_opens_again_is_being_out(tmp_path
         ("weekday", "2026-01-06T07:00", False),
     ],
 )
-def test_the_run_begins_on_the_day_of_the_log_that_is_asked_for(
-    tmp_path: Path, day: object, start: str, kitchen: bool
-) -> None:
+def test_the_run_begins_on_the_day_of_the_log_that_is_asked_for(tmp_path, day, start, kitchen):
     file = tmp_path / "events.txt"
     file.write_text(
         "2020-03-02 07:00:00 Kitchen Kitchen ON Cook\n2020-03-03 07:00:00 Bedroom Bedroom ON Sleep\n"
@@ -235,9 +233,7 @@ def test_the_run_begins_on_the_day_of_the_log_that_is_asked_for(
         ({"gaps": "guess"}, "unknown.*hold.*walk"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_what_would(
-    tmp_path: Path, keys: dict[str, Any], message: str
-) -> None:
+def test_what_does_not_fit_is_refused_with_what_would(tmp_path, keys, message):
     content = replay(events(tmp_path, MORNING))
     content["users"]["ben"] |= {k: v for k, v in keys.items() if k != "start"}
     content["simulation"]["start"] = keys.get("start", f"{DAY}T07:00")
@@ -245,7 +241,7 @@ def test_what_does_not_fit_is_refused_with_what_would(
         run(content)
 
 
-def test_a_label_that_no_room_stands_for_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_label_that_no_room_stands_for_is_refused_by_name(tmp_path):
     log = events(tmp_path, [("07:00:00", "Sauna", "Relax")])
     message = (
         r"users.ben: no room of this home stands for 'Sauna' \(readings in the log: 1\); choose"
@@ -255,7 +251,7 @@ def test_a_label_that_no_room_stands_for_is_refused_by_name(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("layout", ["rooms", "positions"])
-def test_no_span_and_no_step_length_changes_what_is_replayed(tmp_path: Path, layout: str) -> None:
+def test_no_span_and_no_step_length_changes_what_is_replayed(tmp_path, layout):
     log = events(tmp_path, MORNING) if layout == "rooms" else fixes(tmp_path, ZIGZAG)
     one = run(replay(log, "10 min"))
     assert one.digest == run(replay(log, "10 min"), "simulation.max_span=1").digest
@@ -277,7 +273,7 @@ class Detour(Behavior):
 """
 
 
-def test_after_another_behavior_it_walks_to_where_the_log_has_it(tmp_path: Path) -> None:
+def test_after_another_behavior_it_walks_to_where_the_log_has_it(tmp_path):
     (tmp_path / "detour.py").write_text(DETOUR)
     content = replay(events(tmp_path, MORNING))
     user = content["users"]["ben"]
@@ -293,7 +289,7 @@ def test_after_another_behavior_it_walks_to_where_the_log_has_it(tmp_path: Path)
     assert np.hypot(np.diff(poses.x), np.diff(poses.y))[leave - 5 : leave + 30].max() < 1.01
 
 
-def test_asked_anew_in_the_middle_it_goes_on_as_the_log_says(tmp_path: Path) -> None:
+def test_asked_anew_in_the_middle_it_goes_on_as_the_log_says(tmp_path):
     simulation = Simulation(replay(events(tmp_path, MORNING)))
     for minute in (2, 5.25, 6, 12):
         simulation.run_until(timedelta(minutes=minute))
@@ -322,9 +318,7 @@ CASAS_ROOMS = {
 
 
 @pytest.mark.slow
-def test_casas_at_each_second_that_a_sensor_switches_on_the_user_is_there(
-    shared_data: Path,
-) -> None:
+def test_casas_at_each_second_that_a_sensor_switches_on_the_user_is_there(shared_data):
     log = shared_data / "activity" / "casas_al" / "events_10_days.txt"
     content = replay(log, "10 d", start="2011-06-15")
     rooms = rooms_of(content)
@@ -340,7 +334,7 @@ def test_casas_at_each_second_that_a_sensor_switches_on_the_user_is_there(
 
 
 @pytest.mark.slow
-def test_uci_adl_at_each_begin_the_user_is_there_and_out_while_out(shared_data: Path) -> None:
+def test_uci_adl_at_each_begin_the_user_is_there_and_out_while_out(shared_data):
     folder = shared_data / "activity" / "uci_adl_a"
     content = replay(folder, "14 d", start="2011-11-28")
     rooms = rooms_of(content)
@@ -373,7 +367,7 @@ def test_uci_adl_at_each_begin_the_user_is_there_and_out_while_out(shared_data: 
 
 
 @pytest.mark.slow
-def test_homer_in_each_activity_the_user_is_in_the_room_it_walked_to(shared_data: Path) -> None:
+def test_homer_in_each_activity_the_user_is_in_the_room_it_walked_to(shared_data):
     folder = shared_data / "activity" / "homer_plus_a"
     content = replay(
         folder,
@@ -412,7 +406,7 @@ def fixes(folder: Path, rows: Iterable[tuple[float, float, float]], name: str = 
 ZIGZAG = [(0, 1, 1), (10, 3.9, 1), (20, 1, 3), (30, 4, 3), (90, 7, 3), (100, 7, 1)]
 
 
-def test_it_is_at_each_fix_when_the_log_says_and_straight_between(tmp_path: Path) -> None:
+def test_it_is_at_each_fix_when_the_log_says_and_straight_between(tmp_path):
     poses = path(run(replay(fixes(tmp_path, ZIGZAG), "3 min")), "ben")
     for t, x, y in ZIGZAG:
         assert (x, y) == pytest.approx((poses.x[t], poses.y[t]), abs=1e-3)
@@ -421,7 +415,7 @@ def test_it_is_at_each_fix_when_the_log_says_and_straight_between(tmp_path: Path
     assert poses.away[101:].all()  # what comes after the last fix, nobody knows
 
 
-def test_between_two_fixes_with_a_wall_between_it_goes_through_the_door(tmp_path: Path) -> None:
+def test_between_two_fixes_with_a_wall_between_it_goes_through_the_door(tmp_path):
     kitchen, living = (6.0, 1.0), (4.0, 1.0)
     log = fixes(tmp_path, [(0, *living), (20, *kitchen)])
     poses = path(run(replay(log, "1 min")), "ben")
@@ -431,7 +425,7 @@ def test_between_two_fixes_with_a_wall_between_it_goes_through_the_door(tmp_path
     assert "1 legs go around a wall" in notes(run(replay(log, "1 min")))[-1]
 
 
-def test_fixes_in_walls_are_moved_off_and_those_outside_the_home_left_out(tmp_path: Path) -> None:
+def test_fixes_in_walls_are_moved_off_and_those_outside_the_home_left_out(tmp_path):
     log = fixes(tmp_path, [(0, 4.98, 1), (10, 4, 1), (20, 40, 1), (30, 2, 3)])
     stored = run(replay(log, "40 s"))
     poses = path(stored, "ben")
@@ -442,7 +436,7 @@ def test_fixes_in_walls_are_moved_off_and_those_outside_the_home_left_out(tmp_pa
     assert "1 fixes are moved to the nearest place where the body fits" in lines
 
 
-def test_a_log_of_positions_most_of_which_are_outside_the_home_is_refused(tmp_path: Path) -> None:
+def test_a_log_of_positions_most_of_which_are_outside_the_home_is_refused(tmp_path):
     centimetres = fixes(tmp_path, [(0, 400, 100), (10, 200, 300), (20, 2, 3)])
 
     with pytest.raises(
@@ -451,7 +445,7 @@ def test_a_log_of_positions_most_of_which_are_outside_the_home_is_refused(tmp_pa
         run(replay(centimetres, "40 s"))
 
 
-def test_a_gap_between_fixes_is_unknown_held_or_walked(tmp_path: Path) -> None:
+def test_a_gap_between_fixes_is_unknown_held_or_walked(tmp_path):
     log = fixes(tmp_path, [(0, 1, 1), (5, 1, 1), (600, 4, 1)])
     stored = run(replay(log, "11 min"))
     assert [(6, "unknown"), (600, "known")] == [
@@ -467,7 +461,7 @@ def test_a_gap_between_fixes_is_unknown_held_or_walked(tmp_path: Path) -> None:
     assert 2.5 == pytest.approx(walked.x[302], abs=0.05)
 
 
-def test_a_frame_of_its_own_gives_the_same_life(tmp_path: Path) -> None:
+def test_a_frame_of_its_own_gives_the_same_life(tmp_path):
     plain = run(replay(fixes(tmp_path, ZIGZAG), "2 min"))
     # In feet, turned by a quarter, from another corner.
     rows = [(t, (y - 2) / 0.3048, -(x - 1) / 0.3048) for t, x, y in ZIGZAG]
@@ -485,7 +479,7 @@ def test_a_frame_of_its_own_gives_the_same_life(tmp_path: Path) -> None:
     assert any("fits its 3 matches to 0.00 m" in note for note in notes(same))
 
 
-def test_legs_too_fast_to_be_true_are_reported_and_still_on_time(tmp_path: Path) -> None:
+def test_legs_too_fast_to_be_true_are_reported_and_still_on_time(tmp_path):
     log = fixes(tmp_path, [(0, 1, 1), (0.5, 1, 1.1), (1, 4.5, 1), (10, 4.5, 1)])
     stored = run(replay(log, "20 s"))
     assert 4.5 == pytest.approx(path(stored, "ben").x[1], abs=1e-3)
@@ -495,5 +489,5 @@ def test_legs_too_fast_to_be_true_are_reported_and_still_on_time(tmp_path: Path)
     )
 
 
-def test_the_flat_of_these_tests_has_the_rooms_they_speak_of() -> None:
+def test_the_flat_of_these_tests_has_the_rooms_they_speak_of():
     assert {"living_room", "kitchen", "bedroom", "bathroom", "storage"} == set(ROOMS)

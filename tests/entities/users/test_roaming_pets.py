@@ -16,7 +16,7 @@ def cat(duration: str = "1 d", **fields: Any) -> dict[str, Any]:
     return scenario(duration, users={"rex": {"type": "pet", "radius": 0.1, **fields}})
 
 
-def test_it_sleeps_most_of_the_time_and_roams_through_its_rooms() -> None:
+def test_it_sleeps_most_of_the_time_and_roams_through_its_rooms():
     stored = run(cat("4 d", rooms=ROOMS, start="kitchen"))
     poses = path(stored, "rex")
     moves = (np.diff(poses.x) != 0) | (np.diff(poses.y) != 0)
@@ -33,7 +33,7 @@ def test_it_sleeps_most_of_the_time_and_roams_through_its_rooms() -> None:
         ({"rooms": ["attic"]}, ["attic"]),
     ],
 )
-def test_a_pet_that_can_not_live_is_refused(fields: dict[str, Any], words: list[str]) -> None:
+def test_a_pet_that_can_not_live_is_refused(fields, words):
     with pytest.raises(InputError) as caught:
         Simulation(cat(**fields))
     for word in ["users.rex", *words]:

@@ -38,9 +38,7 @@ def shares(stored: Run) -> dict[str, float]:
     ("dwell", "duration", "error"),
     some([("5 min", "20 d", 0.02), ("30 min", "60 d", 0.03), ("1 min", "5 d", 0.02)], 2),
 )
-def test_time_in_each_room_tends_to_its_share_ways_included(
-    dwell: str, duration: str, error: float
-) -> None:
+def test_time_in_each_room_tends_to_its_share_ways_included(dwell, duration, error):
     """The standard error of a share is about sqrt(0.25 * 1.3 * dwell / duration), 0.01 at most."""
     realised = stay(dwell, duration)
     for room, share in SHARES.items():
@@ -48,7 +46,7 @@ def test_time_in_each_room_tends_to_its_share_ways_included(
 
 
 @pytest.mark.slow
-def test_the_error_shrinks_with_time() -> None:
+def test_the_error_shrinks_with_time():
     def error(duration: str) -> float:
         measured = stay("5 min", duration)
         return max(abs(measured[room] - share) for room, share in SHARES.items())
@@ -56,7 +54,7 @@ def test_the_error_shrinks_with_time() -> None:
     assert error("20 d") < error("12 h") / 2
 
 
-def test_stays_follow_the_law_of_dwell_times() -> None:
+def test_stays_follow_the_law_of_dwell_times():
     stored = sampled(
         "12 d", dwell={"law": "fixed", "mean": "20 min"}, shares={"kitchen": 1, "bedroom": 1}
     )
@@ -69,7 +67,7 @@ def test_stays_follow_the_law_of_dwell_times() -> None:
     assert np.percentile(longest, 5) > 1000
 
 
-def test_rooms_of_a_kind_share_its_part() -> None:
+def test_rooms_of_a_kind_share_its_part():
     content = scenario(
         users={"ana": {"type": "room_sampling", "shares": {"bedroom": 3, "kitchen": 1}}}
     )
@@ -94,7 +92,7 @@ def test_rooms_of_a_kind_share_its_part() -> None:
         ({"shares": {"kitchen": 1}, "dwell": ["1 h", "5 min"]}, ["dwell", "1 h", "5 min"]),
     ],
 )
-def test_what_makes_no_distribution_is_refused(fields: dict[str, Any], words: list[str]) -> None:
+def test_what_makes_no_distribution_is_refused(fields, words):
     with pytest.raises(InputError) as caught:
         Simulation(scenario(users={"ana": {"type": "room_sampling", **fields}}))
     for word in ["users.ana", *words]:

@@ -4,7 +4,6 @@ import copy
 import itertools
 import json
 from datetime import datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,14 +64,14 @@ def family(duration: str = "2 d", **household: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", bundled_names())
-def test_every_persona_that_comes_along_lives_a_week_in_a_small_flat(name: str) -> None:
+def test_every_persona_that_comes_along_lives_a_week_in_a_small_flat(name):
     stored = run(lives(name, "7 d"))
     details = set(table(stored, "events", event="activity")["detail"])
     assert {"sleep"} < details
 
 
 @pytest.mark.parametrize("span", some([7, 1], 2))
-def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
+def test_every_table_is_the_same_for_every_max_span(span):
     content = family("45 min", away=[["2026-01-05T07:30", "2026-01-05T07:36"]])
     content["users"]["rex"] = {"type": "pet"}
     content["users"]["dan"] = {"type": "population"}
@@ -85,7 +84,7 @@ def test_every_table_is_the_same_for_every_max_span(span: int) -> None:
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
-def test_a_life_does_not_depend_on_who_else_there_is() -> None:
+def test_a_life_does_not_depend_on_who_else_there_is():
     alone = lives()
     crowd = copy.deepcopy(alone)
     crowd["users"]["ben"] = {"type": "routine", "persona": "student"}
@@ -95,7 +94,7 @@ def test_a_life_does_not_depend_on_who_else_there_is() -> None:
     assert (one.heading == other.heading).all()
 
 
-def test_two_seeds_give_different_lives_and_one_the_same() -> None:
+def test_two_seeds_give_different_lives_and_one_the_same():
     content = lives(duration="2 d")
     first, again = run(content), run(content)
     other = run(content, seed=5)
@@ -103,14 +102,14 @@ def test_two_seeds_give_different_lives_and_one_the_same() -> None:
     assert (path(first, "ana").room != path(other, "ana").room).any()
 
 
-def test_a_run_can_branch_in_the_middle_of_an_activity() -> None:
+def test_a_run_can_branch_in_the_middle_of_an_activity():
     simulation = Simulation(family("1 d"))
     simulation.run_until(timedelta(hours=3, seconds=17))
     twin = copy.deepcopy(simulation)
     assert simulation.run().digest == twin.run().digest == run(family("1 d")).digest
 
 
-def test_it_does_what_its_day_says_when_it_says_so() -> None:
+def test_it_does_what_its_day_says_when_it_says_so():
     stored = run(lives(SHORT, "3 h", simulation={"start": "2026-01-05T06:30"}))
     events = table(stored, "events", entity="ana")
     details = [d for d, e in zip(events["detail"], events["event"], strict=True) if e == "activity"]
@@ -122,7 +121,7 @@ def test_it_does_what_its_day_says_when_it_says_so() -> None:
     assert back - 1 == gone[-1]
 
 
-def test_it_walks_at_the_pace_of_its_persona() -> None:
+def test_it_walks_at_the_pace_of_its_persona():
     slow, fast = (
         run(lives({**SHORT, "pace": pace}, "3 h", simulation={"start": "2026-01-05T06:30"}))
         for pace in (0.5, 2.0)
@@ -137,7 +136,7 @@ def test_it_walks_at_the_pace_of_its_persona() -> None:
     assert 2.0 == pytest.approx(top_speed(fast), abs=0.08)
 
 
-def test_small_moves_can_be_switched_off() -> None:
+def test_small_moves_can_be_switched_off():
     still, restless = (
         run(lives({"extends": "retired", "leisure": {"read": 1}}, "1 d", small_moves=moves))
         for moves in (False, True)
@@ -152,13 +151,13 @@ def test_small_moves_can_be_switched_off() -> None:
     assert details[0] == details[1]
 
 
-def test_an_activity_is_done_at_its_furniture_in_its_posture() -> None:
+def test_an_activity_is_done_at_its_furniture_in_its_posture():
     stored = run({**lives("works_from_home", "2 d"), **HOME})
     used = table(stored, "events", event="uses")["detail"]
     assert {"bed", "desk", "stove", "sofa"} <= {name.rpartition("_")[0] for name in used}
 
 
-def test_a_family_eats_at_one_time_at_places_of_its_own() -> None:
+def test_a_family_eats_at_one_time_at_places_of_its_own():
     calm = {"needs": None, "errands": None}
     members = {n: {"extends": persona, **calm} for n, persona in FAMILY["members"].items()}
     stored = run(family("3 d", members=members))
@@ -174,14 +173,14 @@ def test_a_family_eats_at_one_time_at_places_of_its_own() -> None:
     assert 3 == len(spots)
 
 
-def test_a_couple_shares_a_bed_and_the_child_has_its_own() -> None:
+def test_a_couple_shares_a_bed_and_the_child_has_its_own():
     simulation = Simulation(family())
     beds = {n: a.behaviors[0].venues["sleep"].seats for n, a in simulation.actors.items()}
     assert beds["ana"][0].thing == beds["ben"][0].thing != beds["cleo"][0].thing
     assert beds["ana"] != beds["ben"]
 
 
-def test_members_never_stand_where_another_does() -> None:
+def test_members_never_stand_where_another_does():
     stored = run(family("3 d"))
     paths = [path(stored, name) for name in FAMILY["members"]]
     for i, one in enumerate(paths):
@@ -192,7 +191,7 @@ def test_members_never_stand_where_another_does() -> None:
             assert (apart[both] > 0.3).mean() > 0.999
 
 
-def test_each_bathroom_is_used_by_one_at_a_time() -> None:
+def test_each_bathroom_is_used_by_one_at_a_time():
     simulation = Simulation(
         family(members={f"user_{i}": "works_outside" for i in range(4)}, couples=[])
     )
@@ -214,7 +213,7 @@ def test_each_bathroom_is_used_by_one_at_a_time() -> None:
     assert sum(waited.values()) > 10  # or nobody was ever in the way
 
 
-def test_on_holiday_nobody_is_at_home_and_a_visitor_only_when_visiting() -> None:
+def test_on_holiday_nobody_is_at_home_and_a_visitor_only_when_visiting():
     content = family("2 d", away=[["2026-01-05T08:00", "2026-01-06T06:00"]])
     visit = ["2026-01-05T12:00", "2026-01-05T20:00"]
     content["users"]["eve"] = {"type": "routine", "persona": "retired", "visits": [visit]}
@@ -227,7 +226,7 @@ def test_on_holiday_nobody_is_at_home_and_a_visitor_only_when_visiting() -> None
     assert not eve[(hour > 12.01) & (hour < 13)].all()
 
 
-def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day() -> None:
+def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day():
     detour = {"type": f"{OWN}:Scripted", "script": ["kitchen", 60]}
     routine = {"type": "routine", "persona": SHORT}
     content = scenario(
@@ -252,9 +251,7 @@ def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day() -> None:
         ({"visits": [["2026-01-06", "2026-01-05"]]}, ["not before its end"]),
     ],
 )  # fmt: skip
-def test_settings_without_a_possible_day_are_refused(
-    user: dict[str, Any], words: list[str]
-) -> None:
+def test_settings_without_a_possible_day_are_refused(user, words):
     content = scenario(users={"ana": {"type": "routine", **user}})
     with pytest.raises(InputError) as caught:
         Simulation(content)
@@ -262,9 +259,7 @@ def test_settings_without_a_possible_day_are_refused(
         assert word in str(caught.value)
 
 
-def test_a_persona_comes_from_a_file_beside_the_scenario_and_is_stored_whole(
-    tmp_path: Path,
-) -> None:
+def test_a_persona_comes_from_a_file_beside_the_scenario_and_is_stored_whole(tmp_path):
     (tmp_path / "ana.yaml").write_text("extends: retired\npace: 0.5\ndays: {sunday: null}\n")
     (tmp_path / "home.yaml").write_text(
         "extends: bundled:paper\nusers: {ana: {type: routine, persona: ana.yaml}}\n"
@@ -276,12 +271,12 @@ def test_a_persona_comes_from_a_file_beside_the_scenario_and_is_stored_whole(
     assert loaded == fleet2d.load_scenario(loaded.resolved())
 
 
-def test_a_bundled_persona_is_stored_by_its_name() -> None:
+def test_a_bundled_persona_is_stored_by_its_name():
     resolved = fleet2d.load_scenario(lives("child")).resolved()
     assert "child" == resolved["users"]["ana"]["behaviors"][0]["persona"]
 
 
-def test_it_begins_where_the_hour_suggests() -> None:
+def test_it_begins_where_the_hour_suggests():
     for hour, away in (("03:00", False), ("11:00", True)):
         content = lives(simulation={"start": f"2026-01-07T{hour}"})
         state = Simulation(content).state["ana"]
@@ -289,7 +284,7 @@ def test_it_begins_where_the_hour_suggests() -> None:
     assert datetime(2026, 1, 7).weekday() == 2
 
 
-def test_nobody_comes_into_the_bathroom_while_another_is_there() -> None:
+def test_nobody_comes_into_the_bathroom_while_another_is_there():
     persona = {"extends": "works_outside", "activities": RESTLESS}
     members = dict.fromkeys(("ana", "ben", "cleo", "dan"), persona)
     users = {n: {"type": "routine", "household": {"members": members}} for n in members}
@@ -304,7 +299,7 @@ def test_nobody_comes_into_the_bathroom_while_another_is_there() -> None:
     assert max(np.diff(edges)[::2], default=0) < 30
 
 
-def test_a_plan_goes_on_over_midnight_without_telling_it_twice() -> None:
+def test_a_plan_goes_on_over_midnight_without_telling_it_twice():
     once = {"extends": "works_outside", "needs": {"pick_up": None}}  # twice in a row, if at all
     stored = run(lives(once, duration="4 d"))
     details = table(stored, "events", entity="ana", event="activity")
@@ -312,13 +307,13 @@ def test_a_plan_goes_on_over_midnight_without_telling_it_twice() -> None:
     assert not (details["step"] % 86400 == 17 * 3600).any()  # it begins at 07:00: that is midnight
 
 
-def test_a_member_says_in_its_household_when_it_is_away() -> None:
+def test_a_member_says_in_its_household_when_it_is_away():
     user = {"type": "routine", "household": FAMILY, "away": [["2026-01-06", "2026-01-07"]]}
     with pytest.raises(InputError, match="'trips' and 'visits'"):
         fleet2d.load_scenario(scenario(users={"ana": user}))
 
 
-def test_nobody_goes_through_a_wall_to_furniture_out_of_reach(tmp_path: Path) -> None:
+def test_nobody_goes_through_a_wall_to_furniture_out_of_reach(tmp_path):
     outline = [[0, 0], [4, 0], [4, 1], [4.1, 1], [4.1, 0], [6, 0], [6, 3], [4.1, 3], [4.1, 1.3],
                [4, 1.3], [4, 3], [0, 3]]  # fmt: skip
     sofa = {"type": "sofa", "footprint": [[4.8, 0.5], [5.6, 0.5], [5.6, 2.5], [4.8, 2.5]]}
@@ -341,7 +336,7 @@ def locked_out(*changes: dict[str, Any]) -> fleet2d.Run:
     return run({**life, "script": [*shut, *changes]})
 
 
-def test_what_is_done_behind_a_locked_door_is_left_out_and_nothing_else() -> None:
+def test_what_is_done_behind_a_locked_door_is_left_out_and_nothing_else():
     events = locked_out().pandas("events")
     blocked = events[events["event"] == "way_blocked"]
     assert {"work_at_home"} == set(blocked["detail"])
@@ -351,7 +346,7 @@ def test_what_is_done_behind_a_locked_door_is_left_out_and_nothing_else() -> Non
     assert "work_at_home" not in done
 
 
-def test_what_is_done_behind_a_door_is_done_again_once_it_is_unlocked() -> None:
+def test_what_is_done_behind_a_door_is_done_again_once_it_is_unlocked():
     events = locked_out({"at": "4 h", "unlock": "office"}).pandas("events")
     work = events[(events["event"] == "activity") & (events["detail"] == "work_at_home")]
     assert len(work)
@@ -360,7 +355,7 @@ def test_what_is_done_behind_a_door_is_done_again_once_it_is_unlocked() -> None:
     assert blocked["time"].dt.hour.max() < 11
 
 
-def test_people_without_a_household_are_told_once_that_they_share_seats() -> None:
+def test_people_without_a_household_are_told_once_that_they_share_seats():
     """Two users of one flat stood on one place for 140 minutes a day, without a word."""
     users = {name: {"type": "routine"} for name in ("ana", "ben", "cleo")}
     notes = told_of_households(scenario("1 h", users=users))
@@ -374,7 +369,7 @@ def test_people_without_a_household_are_told_once_that_they_share_seats() -> Non
     assert told_of_households(scenario("1 h", users=apart)) == {}
 
 
-def test_a_run_says_so_too() -> None:
+def test_a_run_says_so_too():
     """Only `fleet2d validate` did, whatever the page of behaviors said."""
     users = {name: {"type": "routine"} for name in ("ana", "ben")}
     notes = fleet2d.run(scenario("1 min", users=users)).manifest["notes"]

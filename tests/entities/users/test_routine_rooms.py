@@ -68,7 +68,7 @@ def odd(minutes: Counter[tuple[str, str]]) -> dict[tuple[str, str], int]:
 
 
 @pytest.mark.slow
-def test_members_of_a_household_leave_the_bathroom_before_a_short_rest() -> None:
+def test_members_of_a_household_leave_the_bathroom_before_a_short_rest():
     """Who had washed hands for a moment during a rest finished it there, beside the next one."""
     household = {"members": {"ana": "retired", "ben": "retired"}}
     users = {name: {"type": "routine", "household": household} for name in household["members"]}
@@ -85,7 +85,7 @@ def test_members_of_a_household_leave_the_bathroom_before_a_short_rest() -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", some(range(29), 29))
-def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data: Path, name: int) -> None:
+def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data, name):
     """Children played in bathrooms of 11 of 20 homes, up to an hour a day, while others showered."""
     plan = sorted((shared_data / "houseexpo").glob("*.json"))[name]
     assert odd(minutes_still({"type": "houseexpo", "path": str(plan)})) == {}
@@ -93,7 +93,7 @@ def test_nothing_is_done_in_an_odd_room_of_a_real_home(shared_data: Path, name: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("floorplan", some(SYNTHETIC, 72), ids=lambda plan: plan["seed"])
-def test_nothing_is_done_in_an_odd_room_of_a_synthetic_home(floorplan: dict[str, Any]) -> None:
+def test_nothing_is_done_in_an_odd_room_of_a_synthetic_home(floorplan):
     assert odd(minutes_still(floorplan)) == {}
 
 
@@ -167,8 +167,8 @@ KITCHEN_LIVING = ["Kitchen", "Living_Room"]
     ],
 )
 def test_people_watch_television_where_the_sofa_or_the_living_room_is(
-    tmp_path: Path, uses: tuple[list[str], ...], sofa_in: str, expected: str
-) -> None:
+    tmp_path, uses, sofa_in, expected
+):
     room, share = most(minutes_of(("tv", "read"), flat(tmp_path, *uses, sofa_in=sofa_in)))
 
     assert expected == room
@@ -176,7 +176,7 @@ def test_people_watch_television_where_the_sofa_or_the_living_room_is(
 
 
 @pytest.mark.parametrize("hall", ["Hallway", "Hall", "Entryway", "Lobby"])
-def test_nobody_plays_or_works_in_a_hall(tmp_path: Path, hall: str) -> None:
+def test_nobody_plays_or_works_in_a_hall(tmp_path, hall):
     uses = ([hall], ["Kitchen"], ["Bedroom"])
     activities = ("play", "work_at_home", "study", "computer", "hobby", "games")
 
@@ -186,7 +186,7 @@ def test_nobody_plays_or_works_in_a_hall(tmp_path: Path, hall: str) -> None:
     assert minutes[f"{hall.lower()}_1"] < 0.02 * minutes.total()
 
 
-def test_a_room_to_furnish_gets_the_furniture_of_all_its_functions(tmp_path: Path) -> None:
+def test_a_room_to_furnish_gets_the_furniture_of_all_its_functions(tmp_path):
     uses = (["Hallway"], KITCHEN_LIVING, ["Bedroom"])
     both = load(flat(tmp_path, *uses, furnish=True)).objects
     serving = load(flat(tmp_path, ["Hallway"], ["Dining_Room"], ["Bedroom"], furnish=True)).objects

@@ -39,14 +39,14 @@ def seconds_on_one_place(result: Run, *names: str) -> int:
     return total
 
 
-def test_two_people_on_one_seat() -> None:
+def test_two_people_on_one_seat():
     """Before, members of this family spent 7 to 12 hours a week on one place."""
     result = run(FAMILY, "simulation.duration=4 d", "robots.astro=null", "users.rex=null", seed=4)
     assert 0 == seconds_on_one_place(result, "ana", "ben", "cleo")
 
 
 @pytest.mark.parametrize("kind", ["routine", "population"])
-def test_people_without_a_household_may_have_places_of_their_own(kind: str) -> None:
+def test_people_without_a_household_may_have_places_of_their_own(kind):
     """Three who work at home sat on one chair at one desk for 15 hours a day, pair by pair."""
     user = {"type": kind} | ({"persona": "works_from_home"} if kind == "routine" else {})
     on_one_place = {}
@@ -59,7 +59,7 @@ def test_people_without_a_household_may_have_places_of_their_own(kind: str) -> N
     assert on_one_place[True] < 2 * 900  # at a washbasin or a toilet
 
 
-def test_more_people_than_places_leave_nobody_on_a_place_of_another() -> None:
+def test_more_people_than_places_leave_nobody_on_a_place_of_another():
     """Four retired people have one armchair; the others are on spots of the room."""
     chair = {"type": "armchair", "at": [11.3, 4.4], "name": "armchair"}
     home = {"type": "bundled", "furniture": [chair]}
@@ -72,14 +72,14 @@ def test_more_people_than_places_leave_nobody_on_a_place_of_another() -> None:
     assert 1 == np.sum(seat, axis=0).max()
 
 
-def test_members_who_share_a_bedroom_and_are_no_couple_lie_on_places_of_their_own() -> None:
+def test_members_who_share_a_bedroom_and_are_no_couple_lie_on_places_of_their_own():
     """The home has three bedrooms, for four: two shared a place in bed all night."""
     names = list(EVENING["members"])
     result = run(household(EVENING, *names, simulation={"start": "2026-01-05T20:00"}), seed=1)
     assert 0 == seconds_on_one_place(result, *names)
 
 
-def test_order_of_users_and_length_of_spans_change_nothing() -> None:
+def test_order_of_users_and_length_of_spans_change_nothing():
     names = list(EVENING["members"])
     forward = run(household(EVENING, *names), seed=2)
     for span in (61, 7200):
@@ -93,7 +93,7 @@ def test_order_of_users_and_length_of_spans_change_nothing() -> None:
         assert np.array_equal(paths[0].y, paths[1].y)
 
 
-def test_members_who_are_not_in_the_scenario_take_no_place() -> None:
+def test_members_who_are_not_in_the_scenario_take_no_place():
     """Ana is the last of four, and the only one in the home: the one armchair is hers."""
     chair = {"type": "armchair", "at": [11.3, 4.4], "name": "armchair"}
     home = {"type": "bundled", "furniture": [chair]}
@@ -102,7 +102,7 @@ def test_members_who_are_not_in_the_scenario_take_no_place() -> None:
     assert "armchair" in table(alone, "events", event="uses", entity="ana")["detail"]
 
 
-def test_branches_and_stored_states_have_the_same_places(tmp_path: Path) -> None:
+def test_branches_and_stored_states_have_the_same_places(tmp_path):
     simulation = Simulation(household(EVENING, *EVENING["members"]), seed=5)
     simulation.run_until(timedelta(hours=17))
     simulation.save(tmp_path / "state")
@@ -128,5 +128,5 @@ def at(begin: int, end: int, role: int = PLANNED, activity: str = "tv") -> Episo
     ],
     ids=["one", "resumed", "finished", "short gap", "resumed after being out", "gap resumed"],
 )  # fmt: skip
-def test_what_is_done_in_one_place(episodes: list[Episode], groups: list[list[int]]) -> None:
+def test_what_is_done_in_one_place(episodes, groups):
     assert groups == _stays(episodes, lambda episode: episode.activity == "work")

@@ -41,7 +41,7 @@ def step_of(text: str, step_s: float = 1.0) -> int:
 
 
 @pytest.fixture(scope="module")
-def morning() -> Run:
+def morning():
     """An hour with every kind of item."""
     return run(
         one(
@@ -65,20 +65,20 @@ def departures(stored: Run) -> list[int]:
     return [k for k in range(1, len(moves)) if moves[k] and not moves[k - 1]]
 
 
-def test_it_begins_where_the_item_before_the_run_leaves_it(morning: Run) -> None:
+def test_it_begins_where_the_item_before_the_run_leaves_it(morning):
     assert {"bedroom_1"} == set(rooms(morning)[: step_of("07:02") + 1])
 
 
-def test_it_sets_out_exactly_when_an_item_begins_or_is_over(morning: Run) -> None:
+def test_it_sets_out_exactly_when_an_item_begins_or_is_over(morning):
     expected = ["07:02", "07:06", "07:16", "07:30", "07:45:30"]
     assert [step_of(text) for text in expected] == departures(morning)
 
 
-def test_after_a_dwell_with_nothing_due_it_rests(morning: Run) -> None:
+def test_after_a_dwell_with_nothing_due_it_rests(morning):
     assert {"living_room_1"} == set(rooms(morning)[step_of("07:17") : step_of("07:30")])
 
 
-def test_it_arrives_as_soon_as_the_way_allows_and_stays(morning: Run) -> None:
+def test_it_arrives_as_soon_as_the_way_allows_and_stays(morning):
     poses = path(morning, "ana")
     at = step_of("07:45:30")
     leg = slice(at, at + 60)
@@ -90,7 +90,7 @@ def test_it_arrives_as_soon_as_the_way_allows_and_stays(morning: Run) -> None:
     )
 
 
-def test_away_and_back_is_at_one_and_the_same_place(morning: Run) -> None:
+def test_away_and_back_is_at_one_and_the_same_place(morning):
     poses = path(morning, "ana")
     gone = np.flatnonzero(poses.away)
     assert gone[-1] == step_of("07:45:30") - 1
@@ -104,7 +104,7 @@ def test_away_and_back_is_at_one_and_the_same_place(morning: Run) -> None:
     )
 
 
-def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning: Run) -> None:
+def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning):
     events = table(morning, "events", entity="ana")
     step_of_event = {
         (event, detail): step
@@ -132,7 +132,7 @@ def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning: 
         assert (poses.x[arrive - 1], poses.y[arrive - 1]) != (poses.x[arrive], poses.y[arrive])
 
 
-def test_a_step_that_does_not_divide_the_times_takes_effect_at_the_next_step() -> None:
+def test_a_step_that_does_not_divide_the_times_takes_effect_at_the_next_step():
     stored = run(
         one(
             agenda(
@@ -158,7 +158,7 @@ def test_a_step_that_does_not_divide_the_times_takes_effect_at_the_next_step() -
         ("2026-01-12T06:59", "bedroom_1"),  # Monday before the first item: as on Sunday
     ],
 )
-def test_agendas_hold_on_their_days(start: str, room: str) -> None:
+def test_agendas_hold_on_their_days(start, room):
     content = one(
         agenda({"at": "07:00", "place": "kitchen"}, on="weekdays"),
         agenda({"at": "08:00", "place": "bathroom"}, on="weekend"),
@@ -169,7 +169,7 @@ def test_agendas_hold_on_their_days(start: str, room: str) -> None:
     assert room == fleet2d.Simulation(content).state["ana"]["room"]
 
 
-def test_the_agenda_of_the_next_day_follows_at_midnight() -> None:
+def test_the_agenda_of_the_next_day_follows_at_midnight():
     stored = run(
         one(
             agenda({"at": "06:00", "place": "kitchen"}, on=["monday", "wednesday"]),
@@ -204,7 +204,7 @@ def test_the_agenda_of_the_next_day_follows_at_midnight() -> None:
         ("2026-01-11T21:30", "bathroom_1"),
     ],
 )
-def test_a_dwell_over_midnight_ends_on_a_later_day(start: str, room: str | None) -> None:
+def test_a_dwell_over_midnight_ends_on_a_later_day(start, room):
     content = one(
         agenda(
             {"at": "14:00", "place": "kitchen"},
@@ -231,7 +231,7 @@ def test_a_dwell_over_midnight_ends_on_a_later_day(start: str, room: str | None)
         ("2026-10-25T01:30", {"tea": "02:30+02:00", "rest": "02:30+01:00", "end": "05:00+01:00"}),
     ],
 )
-def test_a_dwell_lasts_as_long_when_clocks_change(start: str, events: dict[str, str]) -> None:
+def test_a_dwell_lasts_as_long_when_clocks_change(start, events):
     content = one(
         agenda(
             {"at": "02:30", "place": [1.0, 3.0], "dwell": "1 h", "activity": "tea"},
@@ -249,7 +249,7 @@ def test_a_dwell_lasts_as_long_when_clocks_change(start: str, events: dict[str, 
     assert events == dict(zip(activities["detail"], times, strict=True))
 
 
-def test_a_rest_that_a_change_of_clocks_delays_past_the_next_item_is_left_out() -> None:
+def test_a_rest_that_a_change_of_clocks_delays_past_the_next_item_is_left_out():
     content = one(
         agenda(
             {"at": "02:30", "place": [1.0, 3.0], "dwell": "1 h"},
@@ -265,7 +265,7 @@ def test_a_rest_that_a_change_of_clocks_delays_past_the_next_item_is_left_out() 
     assert {"end"} == set(rows[rows["event"] == "activity"]["detail"])
 
 
-def test_an_agenda_that_later_ones_replace_on_each_of_its_days_is_refused() -> None:
+def test_an_agenda_that_later_ones_replace_on_each_of_its_days_is_refused():
     content = one(
         agenda({"at": "08:00", "place": "bathroom"}, on="weekend"),
         agenda({"at": "07:00", "place": "kitchen"}, on="daily"),
@@ -275,7 +275,7 @@ def test_an_agenda_that_later_ones_replace_on_each_of_its_days_is_refused() -> N
         fleet2d.load_scenario(content)
 
 
-def test_an_item_due_while_it_is_still_on_the_way_over_midnight_is_not_forgotten() -> None:
+def test_an_item_due_while_it_is_still_on_the_way_over_midnight_is_not_forgotten():
     stored = run(
         one(
             agenda(
@@ -291,7 +291,7 @@ def test_an_item_due_while_it_is_still_on_the_way_over_midnight_is_not_forgotten
     assert "bathroom_1" == rooms(stored)[-1]
 
 
-def test_an_item_that_begins_while_the_one_before_is_walked_to_comes_late_but_comes() -> None:
+def test_an_item_that_begins_while_the_one_before_is_walked_to_comes_late_but_comes():
     stored = run(
         one(
             agenda(
@@ -307,7 +307,7 @@ def test_an_item_that_begins_while_the_one_before_is_walked_to_comes_late_but_co
     assert "kitchen_1" == rooms(stored)[-1]
 
 
-def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now() -> None:
+def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now():
     schedule = {"type": "schedule", "days": [agenda({"at": "06:00", "place": "kitchen"})]}
     detour = {"type": f"{OWN}:Scripted", "script": ["bedroom", 60]}
     content = scenario(
@@ -318,7 +318,7 @@ def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now() ->
     assert "kitchen_1" == names[-1]
 
 
-def test_it_does_not_move_when_it_begins_where_it_should_be() -> None:
+def test_it_does_not_move_when_it_begins_where_it_should_be():
     stored = run(one(agenda({"at": "06:00", "place": "kitchen"}), duration="30 min"))
     poses = path(stored, "ana")
     assert 1 == len(
@@ -326,7 +326,7 @@ def test_it_does_not_move_when_it_begins_where_it_should_be() -> None:
     )
 
 
-def test_a_room_is_entered_at_another_spot_each_time() -> None:
+def test_a_room_is_entered_at_another_spot_each_time():
     items = [
         {"at": f"07:{minute:02}", "place": ("kitchen", "bathroom")[minute % 4 // 2]}
         for minute in range(0, 60, 2)
@@ -336,7 +336,7 @@ def test_a_room_is_entered_at_another_spot_each_time() -> None:
     assert 30 == len(spots)
 
 
-def test_a_run_may_begin_away() -> None:
+def test_a_run_may_begin_away():
     content = one(
         agenda({"at": "06:00", "away": True}, {"at": "07:10", "place": "kitchen"}),
         duration="30 min",
@@ -377,7 +377,7 @@ def test_a_run_may_begin_away() -> None:
         ([], ["items"]),
     ],
 )
-def test_items_that_do_not_make_a_day_are_refused(items: list[Any], words: list[str]) -> None:
+def test_items_that_do_not_make_a_day_are_refused(items, words):
     with pytest.raises(InputError) as caught:
         fleet2d.load_scenario(one(agenda(*items)))
     for word in ["users.ana.days.0", *words]:
@@ -385,12 +385,12 @@ def test_items_that_do_not_make_a_day_are_refused(items: list[Any], words: list[
 
 
 @pytest.mark.parametrize("on", ["moonday", ["weekdays", "holidays"], []])
-def test_days_that_are_none_are_refused(on: Any) -> None:
+def test_days_that_are_none_are_refused(on):
     with pytest.raises(InputError, match="on"):
         fleet2d.load_scenario(one(agenda({"at": "08:00", "place": "kitchen"}, on=on)))
 
 
-def test_an_unreachable_kind_of_rest_is_left_out_with_a_note() -> None:
+def test_an_unreachable_kind_of_rest_is_left_out_with_a_note():
     item = {"at": "08:00", "place": "kitchen", "dwell": "1 h"}
     actor = fleet2d.Simulation(one(agenda(item), rest="storage")).actors["ana"]
     assert [
@@ -399,14 +399,14 @@ def test_an_unreachable_kind_of_rest_is_left_out_with_a_note() -> None:
     assert "kitchen_1" in {room.name for room in actor.reachable_rooms()}
 
 
-def test_an_unreachable_room_is_refused_before_the_run() -> None:
+def test_an_unreachable_room_is_refused_before_the_run():
     item = {"at": "08:00", "place": "storage_1", "dwell": "1 h"}
     with pytest.raises(InputError, match=r"schedule\.days.*storage_1") as caught:
         fleet2d.Simulation(one(agenda(item), start="kitchen"))
     assert "users.ana" in str(caught.value)
 
 
-def test_time_is_told_to_the_step_when_the_run_begins_within_a_minute() -> None:
+def test_time_is_told_to_the_step_when_the_run_begins_within_a_minute():
     content = one(
         agenda({"at": "06:00", "place": "bedroom"}, {"at": "07:00:30", "place": "kitchen"}),
         simulation={"start": "2026-01-05T07:00:12"},
@@ -415,7 +415,7 @@ def test_time_is_told_to_the_step_when_the_run_begins_within_a_minute() -> None:
     assert [18] == departures(run(content))
 
 
-def test_nobody_stirs_at_midnight() -> None:
+def test_nobody_stirs_at_midnight():
     content = one(
         agenda({"at": "06:00", "place": "living_room"}, {"at": "22:00", "place": "bedroom"}),
         simulation={"start": "2026-01-05T23:50"},
@@ -425,7 +425,7 @@ def test_nobody_stirs_at_midnight() -> None:
     assert 1 == len(set(zip(poses.x.tolist(), poses.y.tolist(), strict=True)))
 
 
-def test_all_items_that_were_due_on_the_way_over_midnight_come_in_order() -> None:
+def test_all_items_that_were_due_on_the_way_over_midnight_come_in_order():
     content = one(
         agenda(
             {"at": "00:00:01", "place": "bathroom", "activity": "first"},

@@ -1,7 +1,5 @@
 """The rooms of plans with rough boxes over walls, and of maps without labels."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -38,7 +36,7 @@ def areas(plan: FloorPlan) -> dict[str, float]:
 # --- Boxes ----------------------------------------------------------------------------------------
 
 
-def test_box_that_reaches_through_a_wall_ends_at_it() -> None:
+def test_box_that_reaches_through_a_wall_ends_at_it():
     plan = build(space(LEFT, RIGHT, DOOR), bedroom=(0.5, 0.5, 5.0, 4.5), office=(4, 1, 7.3, 4.3))
 
     assert {"bedroom_1": 9.0, "office_1": 9.1} == pytest.approx(areas(plan), abs=0.11)
@@ -46,14 +44,14 @@ def test_box_that_reaches_through_a_wall_ends_at_it() -> None:
     assert plan.room_at(4.5, 2.0) is plan.room("office_1")
 
 
-def test_box_that_is_too_small_for_its_chamber_has_all_of_it() -> None:
+def test_box_that_is_too_small_for_its_chamber_has_all_of_it():
     plan = build(space(LEFT, RIGHT, DOOR), bedroom=(1.3, 1.0, 3.9, 3.8), office=RIGHT)
 
     assert {"bedroom_1", "office_1"} == set(areas(plan))
     assert 9.0 == pytest.approx(plan.room("bedroom_1").area_m2, abs=0.1)
 
 
-def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone() -> None:
+def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone():
     walls = shapely.union_all([shapely.box(3, 3, 3.1, 5), shapely.box(3.1, 3, 4.2, 3.1)])
     free = shapely.difference(shapely.box(1, 1, 5, 5), walls)
 
@@ -63,7 +61,7 @@ def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone()
     assert 1 == len(plan.doorways)
 
 
-def test_boxes_in_an_open_plan_divide_it_along_their_sides() -> None:
+def test_boxes_in_an_open_plan_divide_it_along_their_sides():
     plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4, 1, 9, 5))
 
     assert {"kitchen_1": 12.0, "living_room_1": 20.0} == areas(plan)
@@ -71,19 +69,19 @@ def test_boxes_in_an_open_plan_divide_it_along_their_sides() -> None:
     assert ("open", 4.0, None) == (link.kind, pytest.approx(link.width_m), link.doorway)
 
 
-def test_gap_between_boxes_goes_to_the_nearest() -> None:
+def test_gap_between_boxes_goes_to_the_nearest():
     plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(4.4, 1, 9, 5))
 
     assert {"kitchen_1": 12.8, "living_room_1": 19.2} == areas(plan)
 
 
-def test_large_space_that_no_box_covers_is_a_room_of_its_own() -> None:
+def test_large_space_that_no_box_covers_is_a_room_of_its_own():
     plan = build(shapely.box(1, 1, 9, 5), kitchen=(1, 1, 4, 5), living_room=(6.5, 1, 9, 5))
 
     assert {"kitchen_1": 12.0, "living_room_1": 10.0, "unknown_1": 10.0} == areas(plan)
 
 
-def test_box_under_another_is_one_room_with_both_labels() -> None:
+def test_box_under_another_is_one_room_with_both_labels():
     plan = build(shapely.box(1, 1, 5, 5), dining_room=(0.9, 1, 5, 5), kitchen=(1, 1.1, 5, 5.0))
 
     assert [("kitchen_1", ("kitchen", "dining_room"))] == [(r.name, r.labels) for r in plan.rooms]
@@ -93,7 +91,7 @@ def test_box_under_another_is_one_room_with_both_labels() -> None:
     )
 
 
-def test_boxes_that_make_no_room_are_notes_with_the_reason() -> None:
+def test_boxes_that_make_no_room_are_notes_with_the_reason():
     plan = build(
         space(LEFT, RIGHT, DOOR),
         office=LEFT,
@@ -125,7 +123,7 @@ def home_with_hall(height: float) -> FloorPlan:
     return build(space(*rooms, *doors, hall), **boxes)
 
 
-def test_unlabelled_space_that_joins_three_rooms_is_a_hallway_with_a_note() -> None:
+def test_unlabelled_space_that_joins_three_rooms_is_a_hallway_with_a_note():
     plan = home_with_hall(1.2)
 
     assert {"bedroom_1", "kitchen_1", "office_1", "hallway_1"} == set(areas(plan))
@@ -135,14 +133,14 @@ def test_unlabelled_space_that_joins_three_rooms_is_a_hallway_with_a_note() -> N
     assert plan.notes[-1].startswith("hallway_1 is a guess: no label covers its 11.3 m2")
 
 
-def test_large_unlabelled_space_stays_unknown() -> None:
+def test_large_unlabelled_space_stays_unknown():
     assert "unknown_1" in areas(home_with_hall(4.0))
 
 
 # --- No labels ------------------------------------------------------------------------------------
 
 
-def test_space_without_labels_is_divided_at_its_doorways() -> None:
+def test_space_without_labels_is_divided_at_its_doorways():
     plan = FloorPlan.build(
         "home", space(LEFT, (4.1, 1.0, 8.1, 4.0), DOOR), doorways=None, regions_are="none"
     )
@@ -153,7 +151,7 @@ def test_space_without_labels_is_divided_at_its_doorways() -> None:
     assert plan.rooms[0].area_m2 > plan.rooms[1].area_m2
 
 
-def test_a_plan_without_labels_notes_that_its_rooms_are_divided_by_walls() -> None:
+def test_a_plan_without_labels_notes_that_its_rooms_are_divided_by_walls():
     """Half of sixty drawings came back with another number of rooms, and said nothing."""
     flat, room = (
         FloorPlan.build("home", free, [], doorways=None, regions_are="none")
@@ -164,7 +162,7 @@ def test_a_plan_without_labels_notes_that_its_rooms_are_divided_by_walls() -> No
     assert () == room.notes
 
 
-def test_niche_behind_a_narrow_gap_is_no_room() -> None:
+def test_niche_behind_a_narrow_gap_is_no_room():
     niche, gap = (4.1, 2.0, 4.7, 3.4), (4.0, 2.0, 4.1, 2.9)
 
     plan = FloorPlan.build("home", space(LEFT, niche, gap), doorways=None, regions_are="none")
@@ -183,8 +181,8 @@ def test_niche_behind_a_narrow_gap_is_no_room() -> None:
     ids=["wall with a cupboard", "table"],
 )
 def test_wall_between_two_doorways_bounds_rooms_with_a_cupboard_at_it(
-    walls: list[Box], furniture: Box, rooms: int, degrees: float
-) -> None:
+    walls, furniture, rooms, degrees
+):
     """A table of about the same size stands in the middle of a single room."""
     free = shapely.box(1, 1, 7, 7) - shapely.union_all(
         [shapely.box(*box) for box in (*walls, furniture)]
@@ -200,9 +198,7 @@ def test_wall_between_two_doorways_bounds_rooms_with_a_cupboard_at_it(
 @pytest.mark.parametrize(
     ("pier", "doorways"), [((4.3, 4.7), 2), ((3.6, 4.7), 1)], ids=["two doors", "door and gap"]
 )
-def test_pier_between_two_doors_of_a_room_leaves_both(
-    pier: tuple[float, float], doorways: int
-) -> None:
+def test_pier_between_two_doors_of_a_room_leaves_both(pier, doorways):
     """It was left out as furniture in the search of passages, and the one across it was lost."""
     corridor, room = shapely.box(1, 1, 9, 2.7), shapely.box(3, 2.9, 6, 7)
     opening = shapely.box(3.3, 2.7, 5.7, 2.9) - shapely.box(pier[0], 2.7, pier[1], 2.9)
@@ -223,7 +219,7 @@ def slanted_wall(*gaps: tuple[int, int]) -> FloorPlan:
     return FloorPlan.build("map", free, doorways=None, regions_are="none")
 
 
-def test_thin_slanted_wall_of_a_map_bounds_rooms() -> None:
+def test_thin_slanted_wall_of_a_map_bounds_rooms():
     """Its pixels touch at corners only: it was a row of small obstacles, taken for furniture."""
     plan = slanted_wall((80, 98))
 
@@ -231,20 +227,18 @@ def test_thin_slanted_wall_of_a_map_bounds_rooms() -> None:
     assert 0.9 == pytest.approx(plan.doorways[0].width_m, abs=0.1)
 
 
-def test_piece_of_a_slanted_wall_bounds_rooms_between_two_doorways() -> None:
+def test_piece_of_a_slanted_wall_bounds_rooms_between_two_doorways():
     plan = slanted_wall((40, 58), (100, 118))
 
     assert (2, 2) == (len(plan.rooms), len(plan.doorways))
 
 
-def test_short_slanted_chain_of_pixels_is_furniture() -> None:
+def test_short_slanted_chain_of_pixels_is_furniture():
     assert 1 == len(slanted_wall((0, 70), (86, 160)).rooms)
 
 
 @pytest.mark.parametrize(("pixels_long", "kept"), [(2, 0), (10, 1)], ids=["noise", "wall"])
-def test_what_touches_a_wall_at_a_corner_belongs_to_it_unless_it_is_noise(
-    pixels_long: int, kept: int
-) -> None:
+def test_what_touches_a_wall_at_a_corner_belongs_to_it_unless_it_is_noise(pixels_long, kept):
     """Two pixels beside a wall parted the corridor of a real building."""
     pixels = np.ones((60, 100), np.bool_)
     pixels[:20, 50] = False
@@ -264,7 +258,7 @@ MAPS = {
 
 
 @pytest.mark.parametrize("name", list(MAPS))
-def test_real_maps_without_labels_become_rooms(shared_data: Path, name: str) -> None:
+def test_real_maps_without_labels_become_rooms(shared_data, name):
     """As a person would draw them on the picture; pillars and furniture separate no rooms."""
     plan = load_floorplan(shared_data / name)
 
@@ -276,7 +270,7 @@ def test_real_maps_without_labels_become_rooms(shared_data: Path, name: str) -> 
         assert 1 == label_parts(plan.room_of_cell == room.index, False).max() + 1, room.name
 
 
-def test_segments_of_a_robot_keep_their_rooms_and_get_doorways(shared_data: Path) -> None:
+def test_segments_of_a_robot_keep_their_rooms_and_get_doorways(shared_data):
     plan = load_floorplan(shared_data / "valetudo" / "dreame_x40_named_rooms.json")
 
     assert {
@@ -290,7 +284,7 @@ def test_segments_of_a_robot_keep_their_rooms_and_get_doorways(shared_data: Path
 
 
 @pytest.mark.slow
-def test_rooms_of_walls_with_very_many_corners_are_those_of_the_plain_walls() -> None:
+def test_rooms_of_walls_with_very_many_corners_are_those_of_the_plain_walls():
     free = space(LEFT, RIGHT, DOOR)
     dense = shapely.segmentize(free, 0.002)
     rough = shapely.transform(dense, lambda xy: xy + 0.0008 * (np.arange(len(xy)) % 2)[:, None])

@@ -1,7 +1,5 @@
 """Door lines fitted to walls, and the names of doorways."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -28,30 +26,30 @@ def flat(*lines: DoorLine) -> FloorPlan:
     return FloorPlan.build("flat", FREE, ROOMS, doorways=lines)
 
 
-def test_doorway_ends_exactly_at_the_jambs() -> None:
+def test_doorway_ends_exactly_at_the_jambs():
     (doorway,) = flat(DoorLine((2.05, 1.1), (2.05, 1.8))).doorways
     assert ((2.05, 1.0), (2.05, 1.9)) == (doorway.start, doorway.end)
     assert doorway.width_m == pytest.approx(0.9)
 
 
-def test_line_drawn_into_the_walls_is_cut_at_them() -> None:
+def test_line_drawn_into_the_walls_is_cut_at_them():
     (doorway,) = flat(DoorLine((2.05, 0.8), (2.05, 2.1))).doorways
     assert ((2.05, 1.0), (2.05, 1.9)) == (doorway.start, doorway.end)
 
 
-def test_doorway_is_named_after_the_rooms_on_its_left_and_right() -> None:
+def test_doorway_is_named_after_the_rooms_on_its_left_and_right():
     plan = flat(DoorLine((2.05, 1.0), (2.05, 1.9)))
     assert "kitchen_1-bathroom_1" == plan.doorways[0].name
     assert (plan.room("kitchen_1").index, plan.room("bathroom_1").index) == plan.doorways[0].rooms
     assert plan.doorway("kitchen_1-bathroom_1") is plan.doorways[0]
 
 
-def test_reversed_line_swaps_left_and_right() -> None:
+def test_reversed_line_swaps_left_and_right():
     plan = flat(DoorLine((2.05, 1.9), (2.05, 1.0)))
     assert "bathroom_1-kitchen_1" == plan.doorways[0].name
 
 
-def test_own_name_stays() -> None:
+def test_own_name_stays():
     assert "hatch" == flat(DoorLine((2.05, 1.0), (2.05, 1.9), name="hatch")).doorways[0].name
 
 
@@ -64,19 +62,19 @@ def test_own_name_stays() -> None:
         DoorLine((2.05, 1.5), (2.05, 1.5)),  # no length
     ],
 )
-def test_line_in_no_passage_is_noted_and_left_out(line: DoorLine) -> None:
+def test_line_in_no_passage_is_noted_and_left_out(line):
     plan = flat(line)
     assert () == plan.doorways
     assert any("ends at no wall: left out" in note for note in plan.notes)
 
 
-def test_second_of_two_lines_that_cross_is_left_out() -> None:
+def test_second_of_two_lines_that_cross_is_left_out():
     plan = flat(DoorLine((0, 0.5), (2, 0.5)), DoorLine((1, 0), (1, 3)))
     assert 1 == len(plan.doorways)
     assert any("touches another one" in note for note in plan.notes)
 
 
-def test_line_between_slanted_walls_gives_them_a_corner_less_than_a_millimetre_off() -> None:
+def test_line_between_slanted_walls_gives_them_a_corner_less_than_a_millimetre_off():
     room = shapely.Polygon([(0, 0), (4, 0.37), (4.11, 2.93), (0.13, 3.0)])
     plan = FloorPlan.build("slanted", room, doorways=[DoorLine((2, 0.2), (2, 2.95))])
     (doorway,) = plan.doorways
@@ -93,9 +91,7 @@ def test_line_between_slanted_walls_gives_them_a_corner_less_than_a_millimetre_o
 @settings(max_examples=examples(100))
 @given(homes(), seeds())
 @example([shapely.box(192, 128, 256, 192)], 455)  # the corner lies beyond the end of its wall
-def test_corner_beside_a_wall_keeps_a_polygon_valid_where_no_other_wall_is_near(
-    polygons: list[shapely.Polygon], seed: int
-) -> None:
+def test_corner_beside_a_wall_keeps_a_polygon_valid_where_no_other_wall_is_near(polygons, seed):
     draw = np.random.default_rng(seed)
     for polygon in polygons:
         corners = shapely.get_coordinates(polygon)
@@ -108,21 +104,21 @@ def test_corner_beside_a_wall_keeps_a_polygon_valid_where_no_other_wall_is_near(
 
 
 @pytest.mark.parametrize(("tip", "is_alone"), [(1.0, False), (3.0, True)])
-def test_corner_is_alone_unless_its_wall_moves_over_another(tip: float, is_alone: bool) -> None:
+def test_corner_is_alone_unless_its_wall_moves_over_another(tip, is_alone):
     wedge = [(50, tip), (52, 90), (48, 90)]
     polygon = shapely.Polygon([(0, 0), (100, 0), (100, 100), (0, 100)], [wedge])
     changed, was_alone = _with_corner(polygon, np.array([10.0, 4.0]))
     assert is_alone == was_alone == changed.is_valid
 
 
-def test_stored_plan_has_the_same_doorways() -> None:
+def test_stored_plan_has_the_same_doorways():
     plan = flat(DoorLine((2.05, 1.1), (2.05, 1.8), leaf=False))
     lines = [DoorLine(d.start, d.end, d.name, d.leaf) for d in plan.doorways]
     assert plan.doorways == flat(*lines).doorways
     assert plan == flat(*lines)
 
 
-def test_unknown_doorway_is_refused_with_the_known_ones() -> None:
+def test_unknown_doorway_is_refused_with_the_known_ones():
     with pytest.raises(FloorPlanError, match=r"no doorway 'kitchen'.*kitchen_1-bathroom_1"):
         flat(DoorLine((2.05, 1.0), (2.05, 1.9))).doorway("kitchen")
 
@@ -146,11 +142,11 @@ def check_fitted(polygons: list[shapely.Polygon], columns: int, rows: int, seed:
 
 @given(homes(), seeds())
 @settings(max_examples=examples(60))
-def test_fitted_lines_cross_free_space_alone(polygons: list[shapely.Polygon], seed: int) -> None:
+def test_fitted_lines_cross_free_space_alone(polygons, seed):
     _, _, x1, y1 = shapely.total_bounds(polygons).astype(int).tolist()
     check_fitted(polygons, x1 // 64 + 2, y1 // 64 + 2, seed)
 
 
-def test_lines_in_real_homes_are_fitted_or_noted(shared_data: Path) -> None:
+def test_lines_in_real_homes_are_fitted_or_noted(shared_data):
     fitted = [check_fitted(h.polygons, h.columns, h.rows, 3) for h in all_homes(shared_data)]
     assert sum(fitted) > len(fitted)

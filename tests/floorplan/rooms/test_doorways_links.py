@@ -14,21 +14,21 @@ def rooms(*rows: str) -> np.ndarray:
     return np.array([[int(c) if c != "." else -1 for c in row] for row in rows], np.int16)
 
 
-def test_open_border_is_as_long_as_its_longer_side() -> None:
+def test_open_border_is_as_long_as_its_longer_side():
     links = open_borders(LATTICE, rooms("0011", "0011", "0000"), ())
     assert [((0, 1), "open", 1.0)] == [(link.rooms, link.kind, link.width_m) for link in links]
 
 
-def test_single_pair_of_touching_cells_is_no_link() -> None:
+def test_single_pair_of_touching_cells_is_no_link():
     assert () == open_borders(LATTICE, rooms("00..", "0011", "...1"), ())
 
 
-def test_border_along_a_passage_is_that_doorway_and_no_open_border() -> None:
+def test_border_along_a_passage_is_that_doorway_and_no_open_border():
     side = 2 * UNITS_PER_CELL
     assert () == open_borders(LATTICE, rooms("0011", "0011"), [((side, 0), (side, side))])
 
 
-def test_room_graph_has_doorways_first_and_gives_the_neighbors() -> None:
+def test_room_graph_has_doorways_first_and_gives_the_neighbors():
     free = shapely.box(0, 0, 6, 3) - shapely.box(4, 1, 4.1, 3)
     labels = [
         LabelledRegion((kind,), shapely.box(x0, 0, x1, 3))

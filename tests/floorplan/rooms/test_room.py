@@ -36,7 +36,7 @@ def assign(*regions: LabelledRegion) -> tuple[np.ndarray, dict[str, Room], list[
     return room_of_cell, {room.name: room for room in rooms}, notes
 
 
-def test_no_labels_make_one_unknown_room_of_everything() -> None:
+def test_no_labels_make_one_unknown_room_of_everything():
     """Known failure 6: a plan without labels crashed."""
     _, rooms, notes = assign()
 
@@ -49,13 +49,13 @@ def test_no_labels_make_one_unknown_room_of_everything() -> None:
     assert [] == notes
 
 
-def test_uncovered_cells_are_unknown() -> None:
+def test_uncovered_cells_are_unknown():
     _, rooms, _ = assign(region("Bedroom", 0, 0, 2, 3))
 
     assert {"bedroom_1": 18 * 26, "unknown_1": 18 * 26} == {k: r.cells for k, r in rooms.items()}
 
 
-def test_gaps_between_regions_are_noted() -> None:
+def test_gaps_between_regions_are_noted():
     """A builder whose rooms end at the walls left all doorways to a room of type unknown."""
     kitchen, hall = region("Kitchen", 0, 0, 1, 3), region("Hall", 1.2, 0, 2, 3)
 
@@ -68,13 +68,13 @@ def test_gaps_between_regions_are_noted() -> None:
     ] == notes
 
 
-def test_space_beside_one_region_and_large_space_between_regions_are_no_gaps() -> None:
+def test_space_beside_one_region_and_large_space_between_regions_are_no_gaps():
     _, _, notes = assign(region("Kitchen", 0, 0, 1, 3), region("Hall", 1.5, 0, 3.7, 3))
 
     assert [] == notes
 
 
-def test_rooms_are_numbered_by_type_in_file_order() -> None:
+def test_rooms_are_numbered_by_type_in_file_order():
     _, rooms, _ = assign(
         region("Bedroom", 2, 0, 4, 3), region("Toilet", 0, 0, 1, 3), region("Bedroom", 1, 0, 2, 3)
     )
@@ -85,7 +85,7 @@ def test_rooms_are_numbered_by_type_in_file_order() -> None:
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_the_smaller_box_wins_in_either_order(order: int) -> None:
+def test_the_smaller_box_wins_in_either_order(order):
     regions = [region("Hall", 0, 0, 4, 3), region("Toilet", 1, 1, 2, 2)][::order]
 
     _, rooms, _ = assign(*regions)
@@ -94,14 +94,14 @@ def test_the_smaller_box_wins_in_either_order(order: int) -> None:
     assert 26 * 36 - 100 == rooms["hall_1"].cells
 
 
-def test_the_first_of_two_boxes_of_equal_size_wins() -> None:
+def test_the_first_of_two_boxes_of_equal_size_wins():
     _, rooms, _ = assign(region("Hall", 0, 0, 2, 3), region("Office", 1, 0, 3, 3))
 
     assert 18 * 26 == rooms["hall_1"].cells
     assert 10 * 26 == rooms["office_1"].cells
 
 
-def test_the_same_box_under_two_labels_is_one_room_with_both() -> None:
+def test_the_same_box_under_two_labels_is_one_room_with_both():
     """Known failure 6: a kitchen with the same box as the dining room got no cells."""
     _, rooms, notes = assign(
         region("Dining_Room", 0, 0, 2, 3),
@@ -115,7 +115,7 @@ def test_the_same_box_under_two_labels_is_one_room_with_both() -> None:
     assert [] == notes
 
 
-def test_boxes_are_the_same_when_they_round_to_the_same() -> None:
+def test_boxes_are_the_same_when_they_round_to_the_same():
     _, rooms, _ = assign(region("Toilet", 0, 0, 2, 3), region("Bathroom", 0, 0, 2.0004, 3))
 
     assert {"bathroom_1": ("toilet", "bathroom"), "unknown_1": ()} == {
@@ -123,7 +123,7 @@ def test_boxes_are_the_same_when_they_round_to_the_same() -> None:
     }
 
 
-def test_a_box_that_misses_the_free_space_is_a_note_and_no_room() -> None:
+def test_a_box_that_misses_the_free_space_is_a_note_and_no_room():
     """Known failure 6: a room whose box missed the floor got the whole background."""
     _, rooms, notes = assign(
         region("Garage", 7, 7, 9, 9), region("Garage", -5, -5, -1, -1), region("Garage", 0, 0, 4, 2)
@@ -134,7 +134,7 @@ def test_a_box_that_misses_the_free_space_is_a_note_and_no_room() -> None:
     assert notes[0].startswith("the region garage from (7.00, 7.00) to (9.00, 9.00) m has no free")
 
 
-def test_a_box_under_smaller_ones_is_a_note_and_no_room() -> None:
+def test_a_box_under_smaller_ones_is_a_note_and_no_room():
     _, rooms, notes = assign(
         region("Office", 0, 0, 4, 3), region("Hall", 0, 0, 2, 3), region("Gym", 2, 0, 4, 3)
     )
@@ -143,14 +143,14 @@ def test_a_box_under_smaller_ones_is_a_note_and_no_room() -> None:
     assert 1 == len(notes)
 
 
-def test_a_box_thinner_than_a_cell_is_a_note() -> None:
+def test_a_box_thinner_than_a_cell_is_a_note():
     _, rooms, notes = assign(region("Aeration", 1.0, 0, 1.01, 3), region("Hall", 1, 1, 1, 1))
 
     assert ["unknown_1"] == list(rooms)
     assert 2 == len(notes)
 
 
-def test_polygons_take_the_cells_inside_them() -> None:
+def test_polygons_take_the_cells_inside_them():
     triangle = shapely.Polygon([(0, 0), (3, 0), (0, 3)])
     room_of_cell, rooms, _ = assign(LabelledRegion(("Loggia",), triangle))
 
@@ -161,7 +161,7 @@ def test_polygons_take_the_cells_inside_them() -> None:
 
 @quick
 @given(rectilinear_homes())
-def test_upright_shapes_have_the_cells_inside_them(polygons: list[shapely.Polygon]) -> None:
+def test_upright_shapes_have_the_cells_inside_them(polygons):
     shape = shapely.MultiPolygon(polygons)
     window = slice(1, 9), slice(2, 14)
     y, x = np.mgrid[window]
@@ -173,7 +173,7 @@ def test_upright_shapes_have_the_cells_inside_them(polygons: list[shapely.Polygo
     assert _inside_upright((8, 12), window, triangle) is None
 
 
-def test_own_names_stay_and_numbering_skips_them() -> None:
+def test_own_names_stay_and_numbering_skips_them():
     _, rooms, _ = assign(
         region("Bedroom", 0, 0, 1, 3),
         LabelledRegion(("Bedroom",), shapely.box(1, 0, 2, 3), name="bedroom_1"),
@@ -184,7 +184,7 @@ def test_own_names_stay_and_numbering_skips_them() -> None:
     assert ("child_room", ("bedroom",)) == (rooms["Anna's"].type, rooms["Anna's"].labels)
 
 
-def test_one_name_for_two_rooms_is_refused() -> None:
+def test_one_name_for_two_rooms_is_refused():
     den = [LabelledRegion(("Room",), shapely.box(x, 0, x + 1, 3), name="den") for x in (0, 1)]
 
     with pytest.raises(FloorPlanError, match="two rooms are named 'den'"):
@@ -192,7 +192,7 @@ def test_one_name_for_two_rooms_is_refused() -> None:
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_cells_between_thin_teeth_are_those_of_the_plain_comparison(turned: bool) -> None:
+def test_cells_between_thin_teeth_are_those_of_the_plain_comparison(turned):
     """Which way the teeth lie decides along which axis edges are met: the cells are the same."""
     xs = np.linspace(6400, 0, 1201)[1:-1].astype(int) // 2 * 2
     tips = [(x, 3200 if k % 2 else 1600) for k, x in enumerate(xs.tolist())]

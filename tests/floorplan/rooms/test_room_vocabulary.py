@@ -40,14 +40,14 @@ HOUSEEXPO = [
 ]
 
 
-def test_room_type_of_every_houseexpo_category_is_known() -> None:
+def test_room_type_of_every_houseexpo_category_is_known():
     known = {*PRIORITY, "room"}
 
     assert 25 == len(HOUSEEXPO)
     assert set() == {room_type(label) for label in HOUSEEXPO} - known
 
 
-def test_leading_type_prefers_living_to_catch_alls() -> None:
+def test_leading_type_prefers_living_to_catch_alls():
     assert "bathroom" == leading_type(("toilet", "bathroom"))
     assert "child_room" == leading_type(("bedroom", "child_room"))
     assert "sauna" == leading_type(("room", "sauna", "attic"))
@@ -78,11 +78,11 @@ def test_leading_type_prefers_living_to_catch_alls() -> None:
         ("  ", "unknown"),
     ],
 )
-def test_usual_type_goes_by_the_words_of_a_name(name: str, kind: str) -> None:
+def test_usual_type_goes_by_the_words_of_a_name(name, kind):
     assert kind == usual_type(name)
 
 
-def test_every_other_name_is_spelled_as_labels_are_and_means_its_types() -> None:
+def test_every_other_name_is_spelled_as_labels_are_and_means_its_types():
     names = [name for names in ALSO_CALLED.values() for name in names]
 
     assert set() == set(ALSO_CALLED) - set(PRIORITY)
@@ -108,6 +108,6 @@ def test_every_other_name_is_spelled_as_labels_are_and_means_its_types() -> None
         ("Yoga Studio", ("yoga_studio",)),
     ],
 )
-def test_a_name_means_all_uses_of_its_room(name: str, types: tuple[str, ...]) -> None:
+def test_a_name_means_all_uses_of_its_room(name, types):
     assert types == usual_types(name)
     assert usual_type(name) in types

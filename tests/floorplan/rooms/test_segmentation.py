@@ -25,27 +25,27 @@ def areas(rooms: np.ndarray) -> list[float]:
     return (np.bincount(rooms[rooms >= 0]) * CELL**2).round(2).tolist()
 
 
-def test_rooms_are_numbered_by_decreasing_size_and_walls_have_none() -> None:
+def test_rooms_are_numbered_by_decreasing_size_and_walls_have_none():
     rooms = segment_rooms(chambers(2.0, 9.0, links=(Link(0, (0, 1)),)), [False], [0.8], CELL)
     assert [9.0, 2.0] == areas(rooms)
     assert -1 == rooms[0, -1]
 
 
-def test_alcove_is_joined_but_a_toilet_is_not() -> None:
+def test_alcove_is_joined_but_a_toilet_is_not():
     alcove = chambers(9.0, 1.1, links=(Link(0, (0, 1)),))
     toilet = chambers(9.0, 1.3, links=(Link(0, (0, 1)),))
     assert [10.1] == areas(segment_rooms(alcove, [False], [0.8], CELL))
     assert [9.0, 1.3] == areas(segment_rooms(toilet, [False], [0.8], CELL))
 
 
-def test_what_is_too_small_for_a_toilet_goes_across_an_opening_rather_than_a_doorway() -> None:
+def test_what_is_too_small_for_a_toilet_goes_across_an_opening_rather_than_a_doorway():
     links = (Link(0, (0, 1)), Link(1, (1, 2)))
     rooms = segment_rooms(chambers(9.0, 1.0, 6.0, links=links), [False, True], [0.8, 0.8], CELL)
     assert [9.0, 7.0] == areas(rooms)
 
 
 @pytest.mark.parametrize(("width", "found"), [(0.8, [9.0, 6.0]), (0.98, [15.0])])
-def test_corridor_goes_on_past_the_doors_on_either_side(width: float, found: list[float]) -> None:
+def test_corridor_goes_on_past_the_doors_on_either_side(width, found):
     """A line from a door frame to the opposite wall is as wide as the corridor, 1 m."""
     both = chambers(9.0, 6.0, links=(Link(0, (0, 1)),))
 
@@ -55,9 +55,7 @@ def test_corridor_goes_on_past_the_doors_on_either_side(width: float, found: lis
 @pytest.mark.parametrize(
     ("leads_on", "found"), [(True, [18.0, 9.0, 8.0]), (False, [12.0, 9.0, 8.0, 6.0])]
 )
-def test_corridor_that_leads_on_stays_one_where_it_gets_wider(
-    leads_on: bool, found: list[float]
-) -> None:
+def test_corridor_that_leads_on_stays_one_where_it_gets_wider(leads_on, found):
     """A dead end that is open all along its front is a room of its own."""
     of_cell = np.full((20, 300), -1, np.int32)
     of_cell[5:15, :90] = 0
@@ -70,7 +68,7 @@ def test_corridor_that_leads_on_stays_one_where_it_gets_wider(
     assert found == areas(segment_rooms(four, [False] * 3, [0.8, 0.95, 0.8], CELL))
 
 
-def test_legs_of_chairs_make_no_room_seem_a_corridor() -> None:
+def test_legs_of_chairs_make_no_room_seem_a_corridor():
     """Among them no disc is wider than the doorway, which would lie across a corridor."""
     both = chambers(9.0, 6.0, links=(Link(0, (0, 1)),))
     both.of_cell[5, 2::4] = -1
@@ -78,11 +76,11 @@ def test_legs_of_chairs_make_no_room_seem_a_corridor() -> None:
     assert [8.78, 5.85] == areas(segment_rooms(both, [False], [0.8], CELL))
 
 
-def test_chamber_without_a_link_stays_a_room_however_small() -> None:
+def test_chamber_without_a_link_stays_a_room_however_small():
     assert [9.0, 0.5] == areas(segment_rooms(chambers(9.0, 0.5, links=()), [], [], CELL))
 
 
-def test_corridor_past_a_column_is_one_room_and_a_hall_beyond_it_another() -> None:
+def test_corridor_past_a_column_is_one_room_and_a_hall_beyond_it_another():
     corridor = shapely.box(0, 0, 12, 2.2).difference(shapely.box(6, 0, 6.4, 0.3))
     hall = shapely.union_all(
         [shapely.box(0, 0, 5, 5), shapely.box(5, 1, 5.2, 3.2), shapely.box(5.2, 0, 10, 5)]

@@ -28,17 +28,17 @@ def sizes(chambers: Chambers) -> list[float]:
     return (cells * LATTICE.cell**2).round(2).tolist()
 
 
-def test_space_without_passages_is_one_chamber() -> None:
+def test_space_without_passages_is_one_chamber():
     assert [12.0] == sizes(cut())
 
 
-def test_passages_cut_space_into_chambers_that_are_linked_in_the_order_of_the_lines() -> None:
+def test_passages_cut_space_into_chambers_that_are_linked_in_the_order_of_the_lines():
     chambers = cut(4 * M, 2 * M)
     assert [4.0, 4.0, 4.0] == sizes(chambers)
     assert [(0, (1, 2)), (1, (0, 1))] == [(link.line, link.chambers) for link in chambers.links]
 
 
-def test_sliver_between_two_passages_belongs_to_a_chamber_beside_it() -> None:
+def test_sliver_between_two_passages_belongs_to_a_chamber_beside_it():
     chambers = cut(2 * M, 2 * M + M // 10)
     assert [4.2, 7.8] == sizes(chambers)
     assert [(0, 1)] == [link.chambers for link in chambers.links]

@@ -57,14 +57,14 @@ def rooms(*boxes: tuple[float, float, float, float]) -> Polygon:
 LEFT, RIGHT = (1.0, 1.0, 4.0, 4.0), (4.1, 1.0, 7.0, 4.0)
 
 
-def test_gap_between_two_rooms_is_a_doorway_between_its_jambs() -> None:
+def test_gap_between_two_rooms_is_a_doorway_between_its_jambs():
     (passage,) = passages(rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.9)))
 
     assert 0.9 == pytest.approx(width(passage))
     assert ends(passage) in ({(4.0, 2.0), (4.0, 2.9)}, {(4.1, 2.0), (4.1, 2.9)})
 
 
-def test_gap_beside_a_wall_ends_at_the_foot_on_that_wall() -> None:
+def test_gap_beside_a_wall_ends_at_the_foot_on_that_wall():
     """The outer wall runs on: there is no corner for the second jamb."""
     stub = shapely.box(4.0, 1.9, 4.1, 4.0)
 
@@ -73,7 +73,7 @@ def test_gap_beside_a_wall_ends_at_the_foot_on_that_wall() -> None:
     assert ends(passage) in ({(4.0, 1.9), (4.0, 1.0)}, {(4.1, 1.9), (4.1, 1.0)})
 
 
-def test_jambs_on_a_slanted_wall_are_within_a_unit_of_it() -> None:
+def test_jambs_on_a_slanted_wall_are_within_a_unit_of_it():
     slanted = Polygon([(1, 1), (7, 1.3), (7, 4), (1, 4)])
     stub = shapely.box(4.0, 2.0, 4.1, 5.0)
 
@@ -94,12 +94,12 @@ def test_jambs_on_a_slanted_wall_are_within_a_unit_of_it() -> None:
     ],
     ids=["room", "bent corridor", "corridor", "bent room", "niche of 10 cm"],
 )
-def test_space_that_narrows_nowhere_has_no_passage(free: Polygon) -> None:
+def test_space_that_narrows_nowhere_has_no_passage(free):
     assert [] == passages(free)
 
 
 @pytest.mark.parametrize("gap", [0.4, 0.5, 1.4, 1.5])
-def test_width_tells_doorways_from_openings_and_cracks(gap: float) -> None:
+def test_width_tells_doorways_from_openings_and_cracks(gap):
     free = rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.0 + gap))
 
     lines = passages(free)
@@ -109,19 +109,19 @@ def test_width_tells_doorways_from_openings_and_cracks(gap: float) -> None:
     assert (MIN_DOOR_M <= gap <= MAX_DOOR_M) == bool(plan.doorways)
 
 
-def test_thick_wall_has_one_doorway() -> None:
+def test_thick_wall_has_one_doorway():
     assert 1 == len(passages(rooms((1, 1, 4, 4), (4.4, 1, 7, 4), (4.0, 2.0, 4.4, 2.9))))
 
 
 STUBS = shapely.union_all([shapely.box(0, 4, 4, 4.1), shapely.box(5.5, 0, 5.6, 3)])
 
 
-def test_opening_in_line_with_no_wall_is_no_gap_in_one() -> None:
+def test_opening_in_line_with_no_wall_is_no_gap_in_one():
     """The way from the end of one wall to that of another is in line with neither."""
     assert [] == passages(shapely.difference(shapely.box(1, 1, 10, 7), STUBS))
 
 
-def test_slanted_opening_between_straight_walls_is_none() -> None:
+def test_slanted_opening_between_straight_walls_is_none():
     """The way from the end of one wall to that of another runs in no direction of the walls."""
     lines = passages(shapely.difference(shapely.box(1, 1, 10, 7), STUBS), gaps_only=False)
 
@@ -130,7 +130,7 @@ def test_slanted_opening_between_straight_walls_is_none() -> None:
 
 
 @pytest.mark.parametrize("degrees", [0, 17, 45])
-def test_main_directions_are_those_of_most_walls_however_they_are_turned(degrees: float) -> None:
+def test_main_directions_are_those_of_most_walls_however_they_are_turned(degrees):
     home = affinity.rotate(rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.9)), degrees, origin=(5, 5))
     directions = WallDirections.of([shapely.transform(home, lambda xy: xy * UNITS)], UNITS)
     at = np.radians([degrees, degrees + 90, degrees + 30])
@@ -141,7 +141,7 @@ def test_main_directions_are_those_of_most_walls_however_they_are_turned(degrees
     assert [True, True, False] == directions.are_main(lines).tolist()
 
 
-def test_walls_with_teeth_are_ragged_but_a_round_wall_is_straight() -> None:
+def test_walls_with_teeth_are_ragged_but_a_round_wall_is_straight():
     """A circle runs in all directions alike, so any passage is in line with it."""
     teeth = [(k / 2, 10 + 0.3 * (k % 2)) for k in range(20, -1, -1)]
     toothed = Polygon([(0, 0), (10, 0), *((y, x) for x, y in teeth[::-1]), *teeth])
@@ -155,9 +155,7 @@ def test_walls_with_teeth_are_ragged_but_a_round_wall_is_straight() -> None:
 
 
 @pytest.mark.parametrize("batch", [1, 3, 10**6])
-def test_passages_do_not_depend_on_how_many_corners_are_looked_at_together(
-    batch: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_passages_do_not_depend_on_how_many_corners_are_looked_at_together(batch, monkeypatch):
     """A comb of 4,000 teeth took 1.7 GB: all pairs of its corners at once."""
     teeth = [(1 + k / 10, 3.5, 1.05 + k / 10, 4.5 + (k % 7) / 20) for k in range(30)]
     free = rooms(LEFT, RIGHT, (3.9, 2, 4.2, 2.9), *teeth)
@@ -167,7 +165,7 @@ def test_passages_do_not_depend_on_how_many_corners_are_looked_at_together(
     assert whole
 
 
-def test_moved_and_mirrored_plan_has_the_same_passages() -> None:
+def test_moved_and_mirrored_plan_has_the_same_passages():
     free = rooms(LEFT, RIGHT, (4.0, 2.0, 4.1, 2.9))
     mirrored = shapely.transform(free, lambda xy: np.stack([12 - xy[:, 0], xy[:, 1] + 3], axis=1))
 
@@ -205,9 +203,7 @@ def grids(draw: st.DrawFn) -> tuple[Polygon, list[shapely.Polygon], int]:
 
 @settings(max_examples=examples(60))
 @given(grids())
-def test_random_grids_of_rooms_have_exactly_their_rooms_and_doors(
-    grid: tuple[Polygon, list[shapely.Polygon], int],
-) -> None:
+def test_random_grids_of_rooms_have_exactly_their_rooms_and_doors(grid):
     free, doors, count = grid
 
     plan = FloorPlan.build("grid", free, doorways=None, regions_are="none")
@@ -222,7 +218,7 @@ def test_random_grids_of_rooms_have_exactly_their_rooms_and_doors(
     }
 
 
-def test_crossing_of_corridors_has_no_opening_from_corner_to_corner() -> None:
+def test_crossing_of_corridors_has_no_opening_from_corner_to_corner():
     """The hall makes diagonals a main direction, but no wall is in line with one there."""
     hall = Polygon([(9, 3), (13, 7), (9, 11), (5, 7)])
     crossing = rooms((1.0, 6.0, 6.0, 7.9), (2.5, 1.0, 4.4, 13.0))

@@ -46,8 +46,8 @@ SEEDS = st.integers(0, 2**32 - 1)
     st.integers(0, 12),
 )
 def test_rooms_are_divided_as_walking_up_and_joining_pair_by_pair_does(
-    seed: int, cell: float, neck: float, mouth: float, least_cells: int
-) -> None:
+    seed, cell, neck, mouth, least_cells
+):
     rooms = divided(seed)
     limits = Limits(neck, mouth, least_cells * cell**2)
 
@@ -61,7 +61,7 @@ def test_rooms_are_divided_as_walking_up_and_joining_pair_by_pair_does(
 
 
 @given(SEEDS)
-def test_parts_are_in_one_piece_within_a_room_and_numbered_by_size(seed: int) -> None:
+def test_parts_are_in_one_piece_within_a_room_and_numbered_by_size(seed):
     rooms = divided(seed)
 
     found = divide_by_shape(rooms, 0.2, Limits(0.65, 0.3, 0.0))
@@ -87,9 +87,7 @@ def areas(rooms: I64) -> list[float]:
 
 
 @pytest.mark.parametrize(("width", "count"), [(1.0, 2), (2.4, 2), (3.4, 1), (4.0, 1)])
-def test_space_is_divided_where_it_is_less_than_two_thirds_as_wide(
-    width: float, count: int
-) -> None:
+def test_space_is_divided_where_it_is_less_than_two_thirds_as_wide(width, count):
     two = space((1, 1, 5, 5), (5, 1, 6, 1 + width), (6, 1, 11, 5))
 
     assert count == len(areas(divide_by_shape(two, CELL, IN_RAGGED_WALLS)))
@@ -97,7 +95,7 @@ def test_space_is_divided_where_it_is_less_than_two_thirds_as_wide(
 
 @pytest.mark.parametrize("turns", range(4))
 @pytest.mark.parametrize(("width", "count"), [(1.4, 2), (3.0, 1)])
-def test_a_corridor_ends_where_it_opens_into_a_hall(width: float, count: int, turns: int) -> None:
+def test_a_corridor_ends_where_it_opens_into_a_hall(width, count, turns):
     """It is nowhere narrower there than along its length."""
     rooms = np.rot90(space((0, 2, 6, 2 + width), (6, 0, 12, 6)), turns)
 
@@ -106,14 +104,14 @@ def test_a_corridor_ends_where_it_opens_into_a_hall(width: float, count: int, tu
     assert count == len(areas(found))
 
 
-def test_corridor_is_one_room_however_long_and_bent() -> None:
+def test_corridor_is_one_room_however_long_and_bent():
     assert [15.8] == areas(
         divide_by_shape(space((0, 0, 12, 1), (11, 0, 12, 4.8)), CELL, IN_RAGGED_WALLS)
     )
 
 
 @pytest.mark.parametrize(("limits", "count"), [(IN_RAGGED_WALLS, 1), (OF_VACUUMS, 2)])
-def test_small_room_counts_in_the_map_of_a_vacuum(limits: Limits, count: int) -> None:
+def test_small_room_counts_in_the_map_of_a_vacuum(limits, count):
     """Elsewhere, it would be a gap among furniture."""
     hall_and_toilet = space((0, 0, 5, 5), (5, 2, 5.3, 2.7), (5.3, 1.5, 6.8, 3.2))
 
@@ -121,7 +119,7 @@ def test_small_room_counts_in_the_map_of_a_vacuum(limits: Limits, count: int) ->
 
 
 @pytest.mark.parametrize(("side", "count"), [(0.5, 1), (1.6, 2)])
-def test_chair_narrows_nothing_but_a_cupboard_does(side: float, count: int) -> None:
+def test_chair_narrows_nothing_but_a_cupboard_does(side, count):
     room = space((0, 0, 8, 3))
     at = slice(round((1.5 - side / 2) / CELL), round((1.5 + side / 2) / CELL))
     room[at, 38:42] = -1
@@ -130,7 +128,7 @@ def test_chair_narrows_nothing_but_a_cupboard_does(side: float, count: int) -> N
 
 
 @pytest.mark.parametrize(("length", "stays"), [(1.2, False), (1.4, True)])
-def test_free_standing_wall_is_no_furniture_however_thin_it_is(length: float, stays: bool) -> None:
+def test_free_standing_wall_is_no_furniture_however_thin_it_is(length, stays):
     """Vacuums draw walls as lines of one cell, of a smaller area than that of a table."""
     rooms = np.zeros((20, 20), np.int32)
     rooms[2 : 2 + round(length / CELL), 10] = -1
@@ -138,18 +136,18 @@ def test_free_standing_wall_is_no_furniture_however_thin_it_is(length: float, st
     assert stays == (without_furniture(rooms, CELL) < 0).any()
 
 
-def test_obstacle_at_the_edge_of_the_map_is_no_furniture() -> None:
+def test_obstacle_at_the_edge_of_the_map_is_no_furniture():
     rooms = np.zeros((5, 5), np.int32)
     rooms[0, 2] = rooms[2, 2] = -1
 
     assert [[0, 2]] == np.argwhere(without_furniture(rooms, CELL) < 0).tolist()
 
 
-def test_rooms_of_one_size_keep_their_order() -> None:
+def test_rooms_of_one_size_keep_their_order():
     assert [-1, 1, 2, 0, 0] == by_size(np.array([-1, 3, 5, 4, 4])).tolist()
 
 
-def test_cluttered_map_is_divided_where_it_narrows_and_has_a_doorway_there() -> None:
+def test_cluttered_map_is_divided_where_it_narrows_and_has_a_doorway_there():
     """Its walls have teeth, and no corner of the one faces a corner of the other."""
     rng = np.random.default_rng(1)
     walls = [shapely.box(4, 0, 4.3, 2), shapely.box(4, 3, 4.3, 5)]

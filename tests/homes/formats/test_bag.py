@@ -53,7 +53,7 @@ def room(width: int = 60, height: int = 40) -> Any:
     return cells
 
 
-def test_the_last_map_is_a_home_in_the_frame_of_the_map(tmp_path: Path) -> None:
+def test_the_last_map_is_a_home_in_the_frame_of_the_map(tmp_path):
     path = write(tmp_path / "slam", ("/map", room(10, 10)), ("/map", room()))
 
     plan = BagMap(path=path).plan()
@@ -66,7 +66,7 @@ def test_the_last_map_is_a_home_in_the_frame_of_the_map(tmp_path: Path) -> None:
     )
 
 
-def test_a_turned_map_is_turned(tmp_path: Path) -> None:
+def test_a_turned_map_is_turned(tmp_path):
     path = write(tmp_path / "slam", ("/map", room()), turn=np.pi / 2)
 
     plan = BagMap(path=path).plan()
@@ -74,7 +74,7 @@ def test_a_turned_map_is_turned(tmp_path: Path) -> None:
     assert plan.free_space.bounds == pytest.approx((-5.5, 2.5, -1.5, 8.5), abs=0.01)
 
 
-def test_a_run_exported_as_a_bag_is_lived_in_again(tmp_path: Path) -> None:
+def test_a_run_exported_as_a_bag_is_lived_in_again(tmp_path):
     run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
     fleet2d.export(run, tmp_path / "home.mcap")
 
@@ -91,16 +91,14 @@ def test_a_run_exported_as_a_bag_is_lived_in_again(tmp_path: Path) -> None:
         ([("/map", np.full((20, 20), -1))], None, "free"),
     ],
 )
-def test_a_bag_without_one_home_is_refused(
-    tmp_path: Path, grids: list[Any], topic: str | None, message: str
-) -> None:
+def test_a_bag_without_one_home_is_refused(tmp_path, grids, topic, message):
     path = write(tmp_path / "slam", *grids)
 
     with pytest.raises(FloorPlanError, match=message):
         BagMap(path=path, topic=topic).plan()
 
 
-def test_a_bag_without_a_map_is_refused(tmp_path: Path) -> None:
+def test_a_bag_without_a_map_is_refused(tmp_path):
     run = fleet2d.run("bundled:paper", "simulation.duration=1 min", seed=4)
     fleet2d.export(run, tmp_path / "home.mcap")
     text = (tmp_path / "home.mcap").read_bytes()

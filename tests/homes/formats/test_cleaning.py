@@ -16,7 +16,7 @@ def two_rooms(gap: str, rows: slice = slice(0, 20), thickness: int = 1) -> Occup
 
 
 @pytest.mark.parametrize("thickness", [1, 2])
-def test_unknown_row_between_rooms_opens_and_wall_beside_it_stays(thickness: int) -> None:
+def test_unknown_row_between_rooms_opens_and_wall_beside_it_stays(thickness):
     raw = two_rooms(" ", slice(5, 18), thickness)
 
     opened, note = bridge_gaps(raw, 2)
@@ -26,7 +26,7 @@ def test_unknown_row_between_rooms_opens_and_wall_beside_it_stays(thickness: int
     assert "are open: 1" in note
 
 
-def test_gap_wider_than_the_setting_stays() -> None:
+def test_gap_wider_than_the_setting_stays():
     opened, note = bridge_gaps(two_rooms(" ", thickness=3), 2)
 
     assert not opened.any()
@@ -34,7 +34,7 @@ def test_gap_wider_than_the_setting_stays() -> None:
     assert not bridge_gaps(two_rooms(" "), 0)[0].any()
 
 
-def test_shut_door_opens_and_a_wall_along_the_whole_room_stays() -> None:
+def test_shut_door_opens_and_a_wall_along_the_whole_room_stays():
     walls = np.full((20, 33), "#")
     walls[:, :15] = walls[:, 18:] = "."
     walls[5:14, 15] = walls[5:14, 17] = "."  # a door of 0.9 m in a wall of 0.3 m, one pixel thick
@@ -44,7 +44,7 @@ def test_shut_door_opens_and_a_wall_along_the_whole_room_stays() -> None:
     assert not bridge_gaps(two_rooms("#"), 2)[0].any()
 
 
-def test_shut_door_that_is_thinner_than_its_wall_opens() -> None:
+def test_shut_door_that_is_thinner_than_its_wall_opens():
     pixels = np.full((30, 32), ".")
     pixels[:, 15:17] = "#"
     pixels[5:14, 15] = "."  # a door of 0.9 m, one pixel thick, in a wall of two
@@ -55,7 +55,7 @@ def test_shut_door_that_is_thinner_than_its_wall_opens() -> None:
     assert np.array_equal(np.argwhere(opened), [[row, 16] for row in range(5, 14)])
 
 
-def test_wall_opens_where_a_robot_drove() -> None:
+def test_wall_opens_where_a_robot_drove():
     raw = two_rooms("#")
     driven = np.zeros(raw.free.shape, np.bool_)
     driven[10] = True
@@ -65,14 +65,14 @@ def test_wall_opens_where_a_robot_drove() -> None:
     assert opened[10, 15]
 
 
-def test_part_too_small_to_stand_in_is_not_bridged() -> None:
+def test_part_too_small_to_stand_in_is_not_bridged():
     raw = two_rooms(" ")
     raw.free[:, 19:] = False  # 0.3 m x 2 m are left
 
     assert not bridge_gaps(raw, 2)[0].any()
 
 
-def test_scraps_are_parts_below_the_area_but_never_the_largest() -> None:
+def test_scraps_are_parts_below_the_area_but_never_the_largest():
     raw = two_rooms("#")
     raw.free[:, 22:] = False  # 1.2 m2 are left
 
@@ -95,7 +95,7 @@ def turned_rooms(degrees: float, door: slice) -> OccupancyMap:
 
 
 @pytest.mark.parametrize("degrees", [0, 17, 33, 45])
-def test_shut_door_opens_however_the_map_is_turned(degrees: float) -> None:
+def test_shut_door_opens_however_the_map_is_turned(degrees):
     raw = turned_rooms(degrees, slice(-5, 4))
 
     opened, _ = bridge_gaps(raw, 2)
@@ -105,7 +105,7 @@ def test_shut_door_opens_however_the_map_is_turned(degrees: float) -> None:
     assert np.count_nonzero(opened) < 30
 
 
-def test_shut_door_opens_though_a_ray_joins_the_rooms() -> None:
+def test_shut_door_opens_though_a_ray_joins_the_rooms():
     raw = turned_rooms(0, slice(-5, 4))
     raw.free[90] |= abs(np.arange(170) - 85) < 5
 
@@ -113,7 +113,7 @@ def test_shut_door_opens_though_a_ray_joins_the_rooms() -> None:
     assert np.count_nonzero(bridge_gaps(raw, 2, ray_width=0.3)[0]) == 8
 
 
-def test_room_behind_a_wide_shut_door_gets_a_door_in_its_middle() -> None:
+def test_room_behind_a_wide_shut_door_gets_a_door_in_its_middle():
     raw = turned_rooms(0, slice(-20, 20))
 
     opened, _ = bridge_gaps(raw, 2)
@@ -136,7 +136,7 @@ def seen_through_a_window(walls: str = "#") -> OccupancyMap:
     return OccupancyMap(pixels == ".", pixels == "#", 0.1)
 
 
-def test_what_was_seen_through_a_window_is_left_out_and_the_room_stays() -> None:
+def test_what_was_seen_through_a_window_is_left_out_and_the_room_stays():
     """In two homes of shared data bundles of rays were rooms, in which people could not be."""
     raw = seen_through_a_window()
     nobody = np.zeros(raw.free.shape, np.bool_)
@@ -149,7 +149,7 @@ def test_what_was_seen_through_a_window_is_left_out_and_the_room_stays() -> None
     assert not drop_rays(raw, 0.0, nobody)[0].any()
 
 
-def test_a_place_that_a_robot_reached_is_no_ray() -> None:
+def test_a_place_that_a_robot_reached_is_no_ray():
     raw = seen_through_a_window()
     driven = np.zeros(raw.free.shape, np.bool_)
     driven[30, 50] = True
@@ -157,13 +157,13 @@ def test_a_place_that_a_robot_reached_is_no_ray() -> None:
     assert not drop_rays(raw, 0.3, driven)[0].any()
 
 
-def test_without_walls_nothing_is_taken_for_rays() -> None:
+def test_without_walls_nothing_is_taken_for_rays():
     raw = seen_through_a_window(walls=" ")
 
     assert not drop_rays(raw, 0.3, np.zeros(raw.free.shape, np.bool_))[0].any()
 
 
-def test_a_second_room_that_its_walls_enclose_is_no_ray() -> None:
+def test_a_second_room_that_its_walls_enclose_is_no_ray():
     pixels = np.full((24, 44), "#")
     pixels[2:22, 2:20] = pixels[2:22, 24:42] = "."
     pixels[11, 20:24] = "."

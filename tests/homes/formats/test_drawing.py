@@ -42,7 +42,7 @@ def read(folder: Path, pixels: U8 = HOME, **options: Any) -> FloorPlan:
     return read_image(draw(folder, pixels), 0.05, **options)
 
 
-def test_what_dark_walls_enclose_is_free_and_the_paper_around_is_not(tmp_path: Path) -> None:
+def test_what_dark_walls_enclose_is_free_and_the_paper_around_is_not(tmp_path):
     plan = read(tmp_path)
 
     assert (2 * 52 * 44 + 12 * 4) * 0.05**2 == pytest.approx(plan.area_m2)
@@ -52,7 +52,7 @@ def test_what_dark_walls_enclose_is_free_and_the_paper_around_is_not(tmp_path: P
     assert 0.6 == pytest.approx(plan.doorways[0].width_m)
 
 
-def test_picture_is_not_mirrored(tmp_path: Path) -> None:
+def test_picture_is_not_mirrored(tmp_path):
     pixels = HOME.copy()
     pixels[14:20, 14:30] = WALL  # the upper left corner
 
@@ -63,9 +63,7 @@ def test_picture_is_not_mirrored(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("threshold", "dark"), [(0.3, False), (0.5, False), (0.7, True)])
-def test_what_is_darker_than_the_threshold_is_wall(
-    tmp_path: Path, threshold: float, dark: bool
-) -> None:
+def test_what_is_darker_than_the_threshold_is_wall(tmp_path, threshold, dark):
     pixels = HOME.copy()
     pixels[20:40, 20:40] = 153  # 0.6 of white
 
@@ -74,7 +72,7 @@ def test_what_is_darker_than_the_threshold_is_wall(
     assert dark == (plan.room_at(1.5, 2.5) is None)
 
 
-def test_lettering_becomes_free_below_the_speck_area(tmp_path: Path) -> None:
+def test_lettering_becomes_free_below_the_speck_area(tmp_path):
     pixels = HOME.copy()
     pixels[30:34, 30:34] = WALL  # 0.04 m2
 
@@ -84,7 +82,7 @@ def test_lettering_becomes_free_below_the_speck_area(tmp_path: Path) -> None:
     assert read(tmp_path).area_m2 == pytest.approx(read(tmp_path, pixels).area_m2 + 0.04)
 
 
-def test_rooms_without_a_way_to_the_rest_are_left_out_with_a_note(tmp_path: Path) -> None:
+def test_rooms_without_a_way_to_the_rest_are_left_out_with_a_note(tmp_path):
     pixels = HOME.copy()
     pixels[34:46, 58:62] = WALL
 
@@ -94,7 +92,7 @@ def test_rooms_without_a_way_to_the_rest_are_left_out_with_a_note(tmp_path: Path
     assert "left out: 5.72 m2 of free space" in plan.notes[0]
 
 
-def test_resolution_scales_and_is_the_default_cell(tmp_path: Path) -> None:
+def test_resolution_scales_and_is_the_default_cell(tmp_path):
     path = draw(tmp_path)
 
     assert 0.02 == read_image(path, 0.02).lattice.cell
@@ -103,7 +101,7 @@ def test_resolution_scales_and_is_the_default_cell(tmp_path: Path) -> None:
     assert read_image(path, 0.1).area_m2 == pytest.approx(4 * read_image(path, 0.05).area_m2)
 
 
-def test_transparent_paper_is_paper(tmp_path: Path) -> None:
+def test_transparent_paper_is_paper(tmp_path):
     images = pytest.importorskip("PIL.Image")
     black = np.zeros_like(HOME)
     pixels = np.dstack([black, black, black, np.where(HOME == WALL, 255, 0).astype(np.uint8)])
@@ -122,7 +120,7 @@ def test_transparent_paper_is_paper(tmp_path: Path) -> None:
         (np.where(np.arange(120) == 60, PAPER, HOME).astype(np.uint8), "outer walls without gaps"),
     ],
 )
-def test_drawing_that_encloses_nothing_is_refused(tmp_path: Path, pixels: U8, message: str) -> None:
+def test_drawing_that_encloses_nothing_is_refused(tmp_path, pixels, message):
     if pixels.shape == HOME.shape:
         pixels[:, 56:66] = PAPER
     with pytest.raises(FloorPlanError, match=message) as caught:
@@ -131,7 +129,7 @@ def test_drawing_that_encloses_nothing_is_refused(tmp_path: Path, pixels: U8, me
     assert "flat.pgm" in str(caught.value)
 
 
-def test_jpeg_is_read_as_the_same_picture(tmp_path: Path) -> None:
+def test_jpeg_is_read_as_the_same_picture(tmp_path):
     images = pytest.importorskip("PIL.Image")
     images.fromarray(HOME).save(tmp_path / "flat.jpg", quality=85)
 
@@ -148,9 +146,7 @@ def with_gap(width: int) -> U8:
 
 
 @pytest.mark.parametrize(("pixels", "closed"), [(1, "0.2"), (4, "0.3"), (11, "0.9"), (20, "1.2")])
-def test_gap_in_an_outer_wall_is_closed_if_the_home_would_be_lost(
-    tmp_path: Path, pixels: int, closed: str
-) -> None:
+def test_gap_in_an_outer_wall_is_closed_if_the_home_would_be_lost(tmp_path, pixels, closed):
     whole = read(tmp_path)
 
     plan = read(tmp_path, with_gap(pixels))
@@ -160,7 +156,7 @@ def test_gap_in_an_outer_wall_is_closed_if_the_home_would_be_lost(
     assert len(whole.rooms) == len(plan.rooms)
 
 
-def test_gap_that_loses_less_than_half_of_the_home_stays_open(tmp_path: Path) -> None:
+def test_gap_that_loses_less_than_half_of_the_home_stays_open(tmp_path):
     pixels = with_gap(8)
     pixels[34:46, 58:62] = WALL  # the door between the rooms is shut
 
@@ -170,7 +166,7 @@ def test_gap_that_loses_less_than_half_of_the_home_stays_open(tmp_path: Path) ->
     assert not any("gaps in the outer walls" in note for note in plan.notes)
 
 
-def test_inside_of_an_object_is_no_home(tmp_path: Path) -> None:
+def test_inside_of_an_object_is_no_home(tmp_path):
     pixels = with_gap(30)
     pixels[20:30, 80:90] = WALL
     pixels[21:29, 81:89] = PAPER  # an armchair
@@ -182,7 +178,7 @@ def test_inside_of_an_object_is_no_home(tmp_path: Path) -> None:
     assert read(tmp_path, pixels, close_gaps=1.6).area_m2 > 10
 
 
-def test_grey_ground_around_white_floor_is_outside(tmp_path: Path) -> None:
+def test_grey_ground_around_white_floor_is_outside(tmp_path):
     pixels = HOME.copy()
     outside = np.ones_like(HOME, np.bool_)
     outside[10:70, 10:110] = False
@@ -196,7 +192,7 @@ def test_grey_ground_around_white_floor_is_outside(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["house13_floor_2", "house17_floor_0", "house35_floor_2"])
-def test_scanned_floor_with_gaps_is_whole(shared_data: Path, name: str) -> None:
+def test_scanned_floor_with_gaps_is_whole(shared_data, name):
     folder = shared_data / "captured" / "floors"
     if not folder.exists():
         pytest.skip(f"there is no {folder}")
@@ -210,7 +206,7 @@ def test_scanned_floor_with_gaps_is_whole(shared_data: Path, name: str) -> None:
 
 
 @pytest.mark.slow
-def test_building_whose_ground_has_several_shades_of_grey_is_whole(shared_data: Path) -> None:
+def test_building_whose_ground_has_several_shades_of_grey_is_whole(shared_data):
     path = shared_data / "captured" / "clutter" / "photo_2020-01-08_09-53-31.png"
     if not path.exists():
         pytest.skip(f"there is no {path}")
@@ -221,7 +217,7 @@ def test_building_whose_ground_has_several_shades_of_grey_is_whole(shared_data: 
     assert plan.area_m2 > 700  # 332 m2 if the grey ground is floor that gaps lead to
 
 
-def test_compressed_picture_whose_ground_is_as_light_as_the_floor_is_read(tmp_path: Path) -> None:
+def test_compressed_picture_whose_ground_is_as_light_as_the_floor_is_read(tmp_path):
     path = tmp_path / "flat.jpg"
     shades = np.where(HOME == WALL, 0, 254).astype(np.uint8)
     Picture.fromarray(shades).save(path, quality=40)  # with lighter pixels beside the walls
@@ -232,7 +228,7 @@ def test_compressed_picture_whose_ground_is_as_light_as_the_floor_is_read(tmp_pa
     assert not any("unknown_grey" in note for note in plan.notes)
 
 
-def test_photograph_is_turned_as_its_camera_was_held(tmp_path: Path) -> None:
+def test_photograph_is_turned_as_its_camera_was_held(tmp_path):
     turned = Picture.Exif()
     turned[0x0112] = 6  # orientation: a quarter turn clockwise
     path = tmp_path / "flat.jpg"
@@ -244,9 +240,7 @@ def test_photograph_is_turned_as_its_camera_was_held(tmp_path: Path) -> None:
     assert x1 - x0 == pytest.approx(52 * 0.05)
 
 
-def test_room_that_is_open_to_the_outside_is_told_with_the_line_that_closes_it(
-    tmp_path: Path,
-) -> None:
+def test_room_that_is_open_to_the_outside_is_told_with_the_line_that_closes_it(tmp_path):
     pixels = HOME.copy()
     pixels[10:14, 27:45] = PAPER  # 1.44 m; the door is narrower, so the other room is a home alone
     path = draw(tmp_path, pixels)
@@ -259,9 +253,7 @@ def test_room_that_is_open_to_the_outside_is_told_with_the_line_that_closes_it(
     assert read_image(path, 0.08, close_gaps=1.6).area_m2 > plan.area_m2 + 10
 
 
-def test_drawing_with_too_many_corners_is_straightened_by_a_pixel(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_drawing_with_too_many_corners_is_straightened_by_a_pixel(tmp_path, monkeypatch):
     pixels = HOME.copy()
     y, x = np.indices(pixels.shape)
     pixels[(x - 14) + 2 * (y - 14) < 60] = WALL  # a slanted wall of 30 steps
@@ -273,7 +265,7 @@ def test_drawing_with_too_many_corners_is_straightened_by_a_pixel(
     assert shapely.count_coordinates(plan.polygons) < 40
 
 
-def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
+def test_component_is_found_and_its_settings_have_an_effect(tmp_path):
     path = draw(tmp_path)
 
     source = Image.model_validate({"path": str(path), "resolution": "4 cm"})
@@ -287,7 +279,7 @@ def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> N
             Image.model_validate({"path": str(path), **wrong})
 
 
-def test_load_floorplan_of_a_picture_asks_for_its_scale(tmp_path: Path) -> None:
+def test_load_floorplan_of_a_picture_asks_for_its_scale(tmp_path):
     path = draw(tmp_path)
 
     assert read_image(path, 0.05) == load_floorplan(path, resolution=0.05)
@@ -297,14 +289,14 @@ def test_load_floorplan_of_a_picture_asks_for_its_scale(tmp_path: Path) -> None:
         load_floorplan("family_home", resolution=0.05)
 
 
-def test_drawing_of_light_walls_is_told_and_read_by_negate(tmp_path: Path) -> None:
+def test_drawing_of_light_walls_is_told_and_read_by_negate(tmp_path):
     with pytest.raises(FloorPlanError, match=r"light on dark ground: set floorplan\.negate=true"):
         read(tmp_path, 255 - HOME)
 
     assert read(tmp_path) == read(tmp_path, 255 - HOME, negate=True)
 
 
-def test_place_of_a_wide_gap_is_marked_and_closed_by_the_line_to_type(tmp_path: Path) -> None:
+def test_place_of_a_wide_gap_is_marked_and_closed_by_the_line_to_type(tmp_path):
     pixels = HOME.copy()
     for wall in (slice(10, 14), slice(66, 70)):  # in each room 1.5 m of an outer wall
         pixels[wall, 20:50] = pixels[wall, 70:100] = PAPER

@@ -35,9 +35,7 @@ def agreement(plan: FloorPlan, style: str) -> float:
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
 @pytest.mark.parametrize("style", STYLES)
-def test_home_is_told_from_lines_text_doors_and_furniture(
-    tmp_path: Path, style: str, suffix: str
-) -> None:
+def test_home_is_told_from_lines_text_doors_and_furniture(tmp_path, style, suffix):
     plan = read(tmp_path, style, suffix)
 
     assert agreement(plan, style) > 0.96
@@ -46,14 +44,14 @@ def test_home_is_told_from_lines_text_doors_and_furniture(
     assert "line_width: 0 takes all" in plan.notes[0]
 
 
-def test_with_a_line_width_of_zero_lines_are_walls(tmp_path: Path) -> None:
+def test_with_a_line_width_of_zero_lines_are_walls(tmp_path):
     plan = read(tmp_path, "outlined", line_width=0)
 
     assert agreement(plan, "outlined") < 0.9
     assert not any(note.startswith("walls are ") for note in plan.notes)
 
 
-def test_thick_frame_around_a_drawing_is_no_wall(tmp_path: Path) -> None:
+def test_thick_frame_around_a_drawing_is_no_wall(tmp_path):
     pixels = np.array(drawn("solid").picture)
     framed = np.pad(pixels[8:-8, 8:-8], 8, constant_values=20)
     path = tmp_path / "framed.png"
@@ -65,7 +63,7 @@ def test_thick_frame_around_a_drawing_is_no_wall(tmp_path: Path) -> None:
     assert plan.notes[0].startswith("walls are drawn thick, in a frame")
 
 
-def test_pixels_as_large_as_lines_leave_all_that_is_dark_wall(tmp_path: Path) -> None:
+def test_pixels_as_large_as_lines_leave_all_that_is_dark_wall(tmp_path):
     path = tmp_path / "flat.png"
     Drawing(load_floorplan("synthetic:33"), "outlined", 0.05).picture.save(path)
 
@@ -77,7 +75,7 @@ def test_pixels_as_large_as_lines_leave_all_that_is_dark_wall(tmp_path: Path) ->
     assert plain.load() == told.load()
 
 
-def test_gap_with_a_line_through_it_is_a_window_and_others_are_doors() -> None:
+def test_gap_with_a_line_through_it_is_a_window_and_others_are_doors():
     walls = np.zeros((60, 200), np.bool_)
     walls[20:28, 10:40] = walls[20:28, 60:90] = walls[20:28, 150:190] = True
     dark = walls.copy()
@@ -93,9 +91,7 @@ def test_gap_with_a_line_through_it_is_a_window_and_others_are_doors() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("style", ["solid", "outlined"])
-def test_picture_without_a_scale_is_answered_with_that_of_its_doors(
-    tmp_path: Path, style: str
-) -> None:
+def test_picture_without_a_scale_is_answered_with_that_of_its_doors(tmp_path, style):
     path = tmp_path / "house.png"
     Drawing(load_floorplan("synthetic:3"), style, 0.0125).picture.save(path)
 

@@ -34,7 +34,7 @@ def write(folder: Path, *floors: dict[str, Any]) -> Path:
     return path
 
 
-def test_rooms_that_touch_are_open_to_each_other(tmp_path: Path) -> None:
+def test_rooms_that_touch_are_open_to_each_other(tmp_path):
     plan = load_floorplan(write(tmp_path, floor("Ground", 0, KITCHEN, BEDROOM)))
 
     assert ["kitchen", "bedroom"] == [room.type for room in plan.rooms]
@@ -42,7 +42,7 @@ def test_rooms_that_touch_are_open_to_each_other(tmp_path: Path) -> None:
     assert "the file has no walls and no doors: rooms that touch are open" in plan.notes
 
 
-def test_floors_lie_side_by_side_and_say_that_no_stairs_join_them(tmp_path: Path) -> None:
+def test_floors_lie_side_by_side_and_say_that_no_stairs_join_them(tmp_path):
     path = write(tmp_path, floor("Up", 2.7, BEDROOM), floor("Ground", 0, KITCHEN))
 
     plan = load_floorplan(path)
@@ -52,13 +52,13 @@ def test_floors_lie_side_by_side_and_say_that_no_stairs_join_them(tmp_path: Path
     assert ["Bedroom"] == [r.name for r in Espresense(path=path, level="Up").load().rooms]
 
 
-def test_damaged_file_names_the_place(tmp_path: Path) -> None:
+def test_damaged_file_names_the_place(tmp_path):
     with pytest.raises(FloorPlanError, match=r"floors\[0\]\.rooms\[0\]\.points has 2 different"):
         load_floorplan(write(tmp_path, floor("Ground", 0, ("Kitchen", [[0, 0], [1, 1]]))))
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
-def test_configurations_of_any_language_and_turn_are_the_home(tmp_path: Path, k: int) -> None:
+def test_configurations_of_any_language_and_turn_are_the_home(tmp_path, k):
     home = small_home(k, turns=(0, 17, 90))
     half = INNER_M / 2
     (_, _, x, y), (_, _, _, top), (_, _, right, _) = home.rooms

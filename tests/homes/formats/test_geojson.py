@@ -112,7 +112,7 @@ def areas(plan: FloorPlan) -> dict[str, float]:
 # --- Rooms that touch -----------------------------------------------------------------------------
 
 
-def test_rooms_that_touch_have_a_wall_between_them_and_doors_lead_through(tmp_path: Path) -> None:
+def test_rooms_that_touch_have_a_wall_between_them_and_doors_lead_through(tmp_path):
     plan = read(tmp_path, KITCHEN, BEDROOM, DOOR)
 
     wall = shapely.difference(shapely.box(3.95, 0, 4.05, 3), shapely.box(3.95, 1, 4.05, 1.9))
@@ -127,12 +127,12 @@ def test_rooms_that_touch_have_a_wall_between_them_and_doors_lead_through(tmp_pa
     assert "rooms touch along 3.0 m: there are walls of 0.1 m but for doors" in plan.notes
 
 
-def test_walls_between_rooms_are_as_thick_as_the_setting_says(tmp_path: Path) -> None:
+def test_walls_between_rooms_are_as_thick_as_the_setting_says(tmp_path):
     assert 27 - 3 * 0.2 == pytest.approx(read(tmp_path, KITCHEN, BEDROOM, wall_m=0.2).area_m2)
     assert 27 == pytest.approx(read(tmp_path, KITCHEN, BEDROOM, wall_m=0).area_m2)
 
 
-def test_corner_where_three_rooms_meet_is_filled(tmp_path: Path) -> None:
+def test_corner_where_three_rooms_meet_is_filled(tmp_path):
     hall = feature(box(0, 3, 9, 5), "room", name="Hall")
 
     plan = read(tmp_path, KITCHEN, BEDROOM, hall)
@@ -143,7 +143,7 @@ def test_corner_where_three_rooms_meet_is_filled(tmp_path: Path) -> None:
     assert 3 == len(plan.polygons)
 
 
-def test_border_that_is_inexact_by_a_centimetre_is_a_wall_all_along(tmp_path: Path) -> None:
+def test_border_that_is_inexact_by_a_centimetre_is_a_wall_all_along(tmp_path):
     slanted = {
         "type": "Polygon",
         "coordinates": [[[4.01, 0], [9, 0], [9, 3], [3.99, 3], [4.01, 0]]],
@@ -154,7 +154,7 @@ def test_border_that_is_inexact_by_a_centimetre_is_a_wall_all_along(tmp_path: Pa
     assert 2 == len(plan.polygons)
 
 
-def test_room_inside_another_has_no_walls(tmp_path: Path) -> None:
+def test_room_inside_another_has_no_walls(tmp_path):
     niche = feature(box(1, 1, 2, 2), "room", name="Niche")
 
     plan = read(tmp_path, KITCHEN, niche)
@@ -163,7 +163,7 @@ def test_room_inside_another_has_no_walls(tmp_path: Path) -> None:
     assert 12 == pytest.approx(plan.area_m2)
 
 
-def test_rooms_that_touch_in_a_corner_only_stay_as_they_are(tmp_path: Path) -> None:
+def test_rooms_that_touch_in_a_corner_only_stay_as_they_are(tmp_path):
     plan = read(tmp_path, KITCHEN, feature(box(4, 3, 8, 6), "room"))
 
     assert 24 == pytest.approx(plan.area_m2)
@@ -172,7 +172,7 @@ def test_rooms_that_touch_in_a_corner_only_stay_as_they_are(tmp_path: Path) -> N
 # --- Walls that the file draws ----------------------------------------------------------------------
 
 
-def test_gap_between_rooms_is_a_wall_and_the_passage_belongs_to_both(tmp_path: Path) -> None:
+def test_gap_between_rooms_is_a_wall_and_the_passage_belongs_to_both(tmp_path):
     bath = feature(box(4.2, 0, 9, 3), "room", name="Bath")
 
     plan = read(tmp_path, KITCHEN, bath, DOOR)
@@ -191,7 +191,7 @@ def test_gap_between_rooms_is_a_wall_and_the_passage_belongs_to_both(tmp_path: P
         box(4, 1, 4.3, 1.9),
     ],
 )
-def test_door_may_be_drawn_anywhere_in_the_wall(tmp_path: Path, door: Any) -> None:
+def test_door_may_be_drawn_anywhere_in_the_wall(tmp_path, door):
     bath = feature(box(4.3, 0, 9, 3), "room")
 
     plan = read(tmp_path, KITCHEN, bath, feature(door, "door"))
@@ -202,7 +202,7 @@ def test_door_may_be_drawn_anywhere_in_the_wall(tmp_path: Path, door: Any) -> No
     assert 12 + 4.7 * 3 + 0.3 * 0.9 == pytest.approx(plan.area_m2)
 
 
-def test_door_in_a_slanted_wall_opens_it_all_the_way(tmp_path: Path) -> None:
+def test_door_in_a_slanted_wall_opens_it_all_the_way(tmp_path):
     left = {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [6, 4], [0, 4], [0, 0]]]}
     right = {"type": "Polygon", "coordinates": [[[4.2, 0], [9, 0], [9, 4], [6.2, 4], [4.2, 0]]]}
     door = feature(line((4.9, 1.6), (5.3, 2.4)), "door")
@@ -213,7 +213,7 @@ def test_door_in_a_slanted_wall_opens_it_all_the_way(tmp_path: Path) -> None:
     assert 0.89 == pytest.approx(plan.doorways[0].width_m, abs=0.02)
 
 
-def test_walls_along_the_borders_are_the_only_ones(tmp_path: Path) -> None:
+def test_walls_along_the_borders_are_the_only_ones(tmp_path):
     hall = feature(box(0, 3, 9, 5), "room", name="Hall")
     walls = [feature(line((0, 3), (9, 3)), "wall"), feature(box(2, 4, 2.2, 5), "wall")]
 
@@ -223,20 +223,20 @@ def test_walls_along_the_borders_are_the_only_ones(tmp_path: Path) -> None:
     assert plan.room_at(4.0, 1.0) is not None
 
 
-def test_free_areas_are_free_and_rooms_are_their_names_then(tmp_path: Path) -> None:
+def test_free_areas_are_free_and_rooms_are_their_names_then(tmp_path):
     plan = read(tmp_path, feature(box(0, 0, 9, 3), "free"), KITCHEN)
 
     assert {"Kitchen": 12.0, "unknown_1": 15.0} == areas(plan)
 
 
-def test_walls_as_lines_need_a_thickness(tmp_path: Path) -> None:
+def test_walls_as_lines_need_a_thickness(tmp_path):
     plan = read(tmp_path, KITCHEN, feature(line((1, 1), (2, 1)), "wall"), wall_m=0)
 
     assert 12 == pytest.approx(plan.area_m2)
     assert ("walls drawn as lines: 1, ignored as wall_m is 0",) == plan.notes
 
 
-def test_opening_where_there_is_no_wall_is_a_doorway(tmp_path: Path) -> None:
+def test_opening_where_there_is_no_wall_is_a_doorway(tmp_path):
     door = feature(line((4, 0), (4, 3)), "opening", name="arch")
 
     plan = read(tmp_path, KITCHEN, BEDROOM, door, wall_m=0)
@@ -244,7 +244,7 @@ def test_opening_where_there_is_no_wall_is_a_doorway(tmp_path: Path) -> None:
     assert [("arch", False)] == [(d.name, d.leaf) for d in plan.doorways]
 
 
-def test_door_that_leads_outside_stays_shut_and_is_the_entrance(tmp_path: Path) -> None:
+def test_door_that_leads_outside_stays_shut_and_is_the_entrance(tmp_path):
     plan = read(tmp_path, KITCHEN, feature(line((0, 1), (0, 2)), "door", name="front"))
 
     assert (0.3, 1.5) == plan.entrance
@@ -252,7 +252,7 @@ def test_door_that_leads_outside_stays_shut_and_is_the_entrance(tmp_path: Path) 
     assert "the door front leads outside: it stays shut" in plan.notes
 
 
-def test_door_in_no_wall_is_ignored_with_a_note(tmp_path: Path) -> None:
+def test_door_in_no_wall_is_ignored_with_a_note(tmp_path):
     plan = read(tmp_path, KITCHEN, feature(line((20, 1), (20, 2)), "door"))
 
     assert ("the door features[1] is in no room's wall: ignored",) == plan.notes
@@ -262,20 +262,18 @@ def test_door_in_no_wall_is_ignored_with_a_note(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("at", [(2.0, 1.0), (0.0, 1.0), (-0.2, 1.0)])
-def test_entrance_is_inside_where_it_is_drawn_or_nearby(
-    tmp_path: Path, at: tuple[float, float]
-) -> None:
+def test_entrance_is_inside_where_it_is_drawn_or_nearby(tmp_path, at):
     plan = read(tmp_path, KITCHEN, feature(point(*at), "entrance"))
 
     assert (max(at[0], 0.1), 1.0) == plan.entrance
 
 
-def test_entrance_far_outside_is_refused(tmp_path: Path) -> None:
+def test_entrance_far_outside_is_refused(tmp_path):
     with pytest.raises(FloorPlanError, match=r"the entrance of flat at .* is not in free space"):
         read(tmp_path, KITCHEN, feature(point(30, 1), "entrance"))
 
 
-def test_objects_and_no_go_areas_are_taken_over(tmp_path: Path) -> None:
+def test_objects_and_no_go_areas_are_taken_over(tmp_path):
     bed = feature(
         box(5, 1, 7, 2.5), "object", type="bed", blocks="path",
         uses=[{"x": 6, "y": 2, "heading": 1.5, "posture": "lie"}],
@@ -311,22 +309,20 @@ def test_objects_and_no_go_areas_are_taken_over(tmp_path: Path) -> None:
         ({"category": "restroom.female"}, "toilet_1", "toilet"),
     ],
 )
-def test_room_has_the_type_of_its_use_else_of_its_name(
-    tmp_path: Path, properties: dict[str, Any], name: str, kind: str
-) -> None:
+def test_room_has_the_type_of_its_use_else_of_its_name(tmp_path, properties, name, kind):
     (room,) = read(tmp_path, feature(box(0, 0, 4, 3), None, **properties)).rooms
 
     assert (name, kind) == (room.name, room.type)
 
 
-def test_rooms_of_one_name_get_numbers(tmp_path: Path) -> None:
+def test_rooms_of_one_name_get_numbers(tmp_path):
     plan = read(tmp_path, KITCHEN, {**BEDROOM, "properties": {"name": "Kitchen"}})
 
     assert ["Kitchen", "Kitchen 2"] == [room.name for room in plan.rooms]
     assert "several rooms are called Kitchen: one of them is Kitchen 2 here" in plan.notes
 
 
-def test_what_has_no_kind_is_counted_in_a_note(tmp_path: Path) -> None:
+def test_what_has_no_kind_is_counted_in_a_note(tmp_path):
     others = [feature(point(1, 1)), feature(line((0, 0), (1, 1))), imdf(None, "venue")]
 
     plan = read(tmp_path, KITCHEN, *others)
@@ -340,7 +336,7 @@ def test_what_has_no_kind_is_counted_in_a_note(tmp_path: Path) -> None:
 # --- IMDF and floors --------------------------------------------------------------------------------
 
 
-def test_imdf_units_openings_and_fixtures_are_read(tmp_path: Path) -> None:
+def test_imdf_units_openings_and_fixtures_are_read(tmp_path):
     door = {"type": "swinging", "automatic": False, "material": "wood"}
     unit = {"level_id": "l0"}
     plan = read(
@@ -376,7 +372,7 @@ FLOORS[0]["id"], FLOORS[1]["id"] = "b", "a"
     ("level", "room"),
     [("0", "Down"), ("G", "Down"), ("a", "Down"), ("1", "Up"), ("Upstairs", "Up")],
 )
-def test_one_level_is_taken(tmp_path: Path, level: str | None, room: str) -> None:
+def test_one_level_is_taken(tmp_path, level, room):
     plan = read(tmp_path, *FLOORS, units="m", level=level)
 
     assert [room] == [plan_room.name for plan_room in plan.rooms]
@@ -384,7 +380,7 @@ def test_one_level_is_taken(tmp_path: Path, level: str | None, room: str) -> Non
     assert (f"of its levels, {other}",) == plan.notes
 
 
-def test_floor_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_floor_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(FloorPlanError, match="no level '7'; its levels are: a or 0 or G, b or 1"):
         read(tmp_path, *FLOORS, units="m", level="7")
 
@@ -405,9 +401,7 @@ def on_earth(geometry: dict[str, Any], latitude: float, longitude: float) -> dic
 @pytest.mark.parametrize(
     ("latitude", "longitude"), [(48.1, 11.6), (-33.9, 151.2), (0, 0), (69, -20)]
 )
-def test_longitude_and_latitude_become_metres(
-    tmp_path: Path, latitude: float, longitude: float
-) -> None:
+def test_longitude_and_latitude_become_metres(tmp_path, latitude, longitude):
     both = [
         {**f, "geometry": on_earth(f["geometry"], latitude, longitude)}
         for f in (KITCHEN, BEDROOM, DOOR)
@@ -421,7 +415,7 @@ def test_longitude_and_latitude_become_metres(
     assert any("became metres east and north of" in note for note in plan.notes)
 
 
-def test_units_can_be_set_by_the_file_and_by_the_setting(tmp_path: Path) -> None:
+def test_units_can_be_set_by_the_file_and_by_the_setting(tmp_path):
     small = feature(box(0, 0, 0.3, 0.3), "room")
     path = write(tmp_path, small, units="m")
 
@@ -435,12 +429,12 @@ def test_units_can_be_set_by_the_file_and_by_the_setting(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("units", ["feet", 3, None, [1]])
-def test_unknown_units_are_refused(tmp_path: Path, units: object) -> None:
+def test_unknown_units_are_refused(tmp_path, units):
     with pytest.raises(FloorPlanError, match="m, degrees or auto is expected"):
         read_geojson(write(tmp_path, KITCHEN, units=units))
 
 
-def test_metres_far_from_the_origin_come_near_it(tmp_path: Path) -> None:
+def test_metres_far_from_the_origin_come_near_it(tmp_path):
     far = feature(box(691_000.5, 5_334_000, 691_004.5, 5_334_003), "room")
 
     plan = read(tmp_path, far)
@@ -452,7 +446,7 @@ def test_metres_far_from_the_origin_come_near_it(tmp_path: Path) -> None:
 # --- Writing ----------------------------------------------------------------------------------------
 
 
-def test_plan_written_as_geojson_comes_back_equal(tmp_path: Path) -> None:
+def test_plan_written_as_geojson_comes_back_equal(tmp_path):
     plan = read(
         tmp_path, KITCHEN, BEDROOM, DOOR, feature(box(0, 2, 1, 3), "no_go"),
         feature(point(1, 1), "entrance"), feature(box(5, 1, 6, 2), "object", type="table"),
@@ -463,7 +457,7 @@ def test_plan_written_as_geojson_comes_back_equal(tmp_path: Path) -> None:
     assert plan == load_floorplan(tmp_path / "again.geojson")
 
 
-def test_bundled_home_written_as_geojson_comes_back_equal(tmp_path: Path) -> None:
+def test_bundled_home_written_as_geojson_comes_back_equal(tmp_path):
     plan = load_floorplan("family_home")
     path = write(tmp_path)
     path.write_text(json.dumps(geojson_document(plan)))
@@ -472,9 +466,7 @@ def test_bundled_home_written_as_geojson_comes_back_equal(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-def test_synthetic_home_written_as_geojson_comes_back_with_its_front_door(
-    tmp_path: Path, seed: int
-) -> None:
+def test_synthetic_home_written_as_geojson_comes_back_with_its_front_door(tmp_path, seed):
     """It stands across its sill, behind which the plan ends, and stayed shut."""
     plan = load_floorplan(f"synthetic:{seed}")
     path = write(tmp_path)
@@ -488,7 +480,7 @@ def test_synthetic_home_written_as_geojson_comes_back_with_its_front_door(
 
 
 @pytest.mark.parametrize("y", [0.0, 0.1])
-def test_door_along_an_outer_wall_of_free_space_leads_outside(tmp_path: Path, y: float) -> None:
+def test_door_along_an_outer_wall_of_free_space_leads_outside(tmp_path, y):
     plan = read(tmp_path, feature(box(0, 0, 5, 4), "free"), feature(line((1, y), (2, y)), "door"))
 
     assert () == plan.doorways
@@ -498,7 +490,7 @@ def test_door_along_an_outer_wall_of_free_space_leads_outside(tmp_path: Path, y:
 # --- As a component, and wrong files ----------------------------------------------------------------
 
 
-def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> None:
+def test_component_is_found_and_its_settings_have_an_effect(tmp_path):
     path = write(tmp_path, *FLOORS, KITCHEN, BEDROOM)
 
     source = GeoJson.model_validate({"path": str(path), "level": 1, "wall_m": "20 cm"})
@@ -510,7 +502,7 @@ def test_component_is_found_and_its_settings_have_an_effect(tmp_path: Path) -> N
         GeoJson.model_validate({"path": str(path), "units": "feet"})
 
 
-def test_room_of_one_part_may_be_written_as_of_several(tmp_path: Path) -> None:
+def test_room_of_one_part_may_be_written_as_of_several(tmp_path):
     one = read_geojson(write(tmp_path, KITCHEN, BEDROOM))
     shape = KITCHEN["geometry"]
     several = {"type": "MultiPolygon", "coordinates": [shape["coordinates"]]}
@@ -518,7 +510,7 @@ def test_room_of_one_part_may_be_written_as_of_several(tmp_path: Path) -> None:
     assert one == read_geojson(write(tmp_path, KITCHEN | {"geometry": several}, BEDROOM))
 
 
-def test_scale_of_cells_is_chosen(tmp_path: Path) -> None:
+def test_scale_of_cells_is_chosen(tmp_path):
     assert 0.1 == load_floorplan(write(tmp_path, KITCHEN), 0.1).lattice.cell
 
 
@@ -546,9 +538,7 @@ def test_scale_of_cells_is_chosen(tmp_path: Path) -> None:
         ({**KITCHEN, "properties": 3}, "properties is 3"),
     ],
 )
-def test_damaged_feature_is_refused_with_its_place(
-    tmp_path: Path, wrong: Any, message: str
-) -> None:
+def test_damaged_feature_is_refused_with_its_place(tmp_path, wrong, message):
     path = write(tmp_path, wrong, KITCHEN)
 
     with pytest.raises(FloorPlanError, match=message) as caught:
@@ -566,12 +556,12 @@ def test_damaged_feature_is_refused_with_its_place(
         ([KITCHEN, feature(box(-1, -1, 9, 9), "wall")], "all of it is wall"),
     ],
 )
-def test_file_without_space_is_refused(tmp_path: Path, features: Any, message: str) -> None:
+def test_file_without_space_is_refused(tmp_path, features, message):
     with pytest.raises(FloorPlanError, match=message):
         read(tmp_path, *features)
 
 
-def test_other_json_is_refused(tmp_path: Path) -> None:
+def test_other_json_is_refused(tmp_path):
     path = write(tmp_path)
     path.write_text('{"type": "Feature"}')
 
@@ -579,7 +569,7 @@ def test_other_json_is_refused(tmp_path: Path) -> None:
         read_geojson(path)
 
 
-def test_outline_that_crosses_itself_is_repaired_with_a_note(tmp_path: Path) -> None:
+def test_outline_that_crosses_itself_is_repaired_with_a_note(tmp_path):
     bow = {"type": "Polygon", "coordinates": [[[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]]}
 
     plan = read(tmp_path, feature(bow, "room"))
@@ -588,7 +578,7 @@ def test_outline_that_crosses_itself_is_repaired_with_a_note(tmp_path: Path) -> 
     assert "features[0].geometry.coordinates touches or crosses itself at (2, 2)" in plan.notes[0]
 
 
-def test_glass_walls_of_imdf_are_seen_through(tmp_path: Path) -> None:
+def test_glass_walls_of_imdf_are_seen_through(tmp_path):
     def unit(category: str, box: tuple[float, ...]) -> dict[str, Any]:
         geometry = shapely.geometry.mapping(shapely.box(*box))
         properties = {"category": category}
@@ -653,7 +643,7 @@ def ring(corners: list[tuple[float, float]]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
-def test_maps_of_any_unit_language_and_noise_are_the_home(tmp_path: Path, k: int) -> None:
+def test_maps_of_any_unit_language_and_noise_are_the_home(tmp_path, k):
     plan = read(tmp_path, *mapped(k))
 
     check(plan, small_home(k), slack=0.03)
@@ -677,7 +667,7 @@ def storey_maps() -> list[dict[str, Any]]:
     ]
 
 
-def test_storeys_of_openstreetmap_lie_side_by_side(tmp_path: Path) -> None:
+def test_storeys_of_openstreetmap_lie_side_by_side(tmp_path):
     plan = read(tmp_path, *storey_maps(), units="m")
 
     assert 2 == len(plan.polygons)
@@ -689,7 +679,7 @@ def test_storeys_of_openstreetmap_lie_side_by_side(tmp_path: Path) -> None:
     assert "Kitchen" not in {room.name for room in upstairs.rooms}
 
 
-def test_portals_are_written_and_read(tmp_path: Path) -> None:
+def test_portals_are_written_and_read(tmp_path):
     plan = read(tmp_path, *storey_maps(), units="m")
 
     save_floorplan(plan, tmp_path / "again.geojson")
@@ -698,7 +688,7 @@ def test_portals_are_written_and_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("k", range(20))
-def test_three_centimetres_of_noise_keep_the_door(tmp_path: Path, k: int) -> None:
+def test_three_centimetres_of_noise_keep_the_door(tmp_path, k):
     """Rooms that touch up to a gap or an overlap of 3 cm."""
     noise = noisy(k, 0.015)
     rooms = [
@@ -715,16 +705,14 @@ def test_three_centimetres_of_noise_keep_the_door(tmp_path: Path, k: int) -> Non
     assert plan.area_m2 == pytest.approx(24 - 0.1 * 2.1, abs=0.3)
 
 
-def test_a_room_may_name_its_building(tmp_path: Path) -> None:
+def test_a_room_may_name_its_building(tmp_path):
     room = feature(box(0, 0, 4, 3), name="Kitchen", building="House A")
 
     assert ["Kitchen"] == [r.name for r in read(tmp_path, room, units="m").rooms]
 
 
 @pytest.mark.parametrize("name", ["urn:ogc:def:crs:EPSG::3857", "EPSG:900913"])
-def test_coordinates_of_web_mercator_are_refused_unless_their_unit_is_given(
-    tmp_path: Path, name: str
-) -> None:
+def test_coordinates_of_web_mercator_are_refused_unless_their_unit_is_given(tmp_path, name):
     crs = {"type": "name", "properties": {"name": name}}
     path = tmp_path / "mercator.geojson"
     path.write_text(json.dumps({**SAMPLE[1], "crs": crs}))
@@ -735,7 +723,7 @@ def test_coordinates_of_web_mercator_are_refused_unless_their_unit_is_given(
     assert GeoJson(path=path, scale=0.61).load().area_m2 > 8
 
 
-def test_coordinates_of_another_reference_system_are_read(tmp_path: Path) -> None:
+def test_coordinates_of_another_reference_system_are_read(tmp_path):
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32633"}}
     path = tmp_path / "utm.geojson"
     path.write_text(json.dumps({**SAMPLE[1], "crs": crs}))
@@ -743,7 +731,7 @@ def test_coordinates_of_another_reference_system_are_read(tmp_path: Path) -> Non
     assert load_floorplan(path).area_m2 > 20
 
 
-def test_latitudes_before_longitudes_are_refused(tmp_path: Path) -> None:
+def test_latitudes_before_longitudes_are_refused(tmp_path):
     corners = [[37.7, -122.4], [37.70004, -122.4], [37.70004, -122.39995], [37.7, -122.4]]
     room = {
         "type": "Feature",

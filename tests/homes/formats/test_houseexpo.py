@@ -35,12 +35,12 @@ SAMPLE: tuple[str, dict[str, Any]] = (
 
 
 @pytest.fixture(scope="module")
-def plans(shared_data: Path) -> list[Path]:
+def plans(shared_data):
     return sorted((shared_data / "houseexpo").glob("*.json"))
 
 
 @pytest.fixture(scope="module")
-def sample(shared_data: Path) -> list[Path]:
+def sample(shared_data):
     return plan_files(shared_data)
 
 
@@ -63,9 +63,7 @@ def home(folder: Path, **content: Any) -> FloorPlan:
 
 
 @pytest.mark.parametrize("cell", [0.05, 0.1, 0.2])
-def test_every_plan_keeps_its_area_and_is_covered_by_disjoint_rooms(
-    sample: list[Path], cell: float
-) -> None:
+def test_every_plan_keeps_its_area_and_is_covered_by_disjoint_rooms(sample, cell):
     """Known failures 6 and 7: rooms cover the free space; coarse cells keep the area."""
     for path in sample:
         content = json.loads(path.read_text())
@@ -84,7 +82,7 @@ def test_every_plan_keeps_its_area_and_is_covered_by_disjoint_rooms(
             assert room is plan.room_at(*room.anchor_xy), path.name
 
 
-def test_every_room_of_every_plan_is_connected(sample: list[Path]) -> None:
+def test_every_room_of_every_plan_is_connected(sample):
     """One walks from any cell of a room to any other without leaving it."""
     for path in sample:
         plan = read_houseexpo(path)
@@ -93,7 +91,7 @@ def test_every_room_of_every_plan_is_connected(sample: list[Path]) -> None:
             assert 1 == pieces, (path.name, room.name)
 
 
-def test_every_box_of_every_plan_is_a_room_or_a_note(sample: list[Path]) -> None:
+def test_every_box_of_every_plan_is_a_room_or_a_note(sample):
     """Count and place the rooms against the boxes of the files."""
     for path in sample:
         boxes: dict[tuple[float, ...], set[str]] = {}
@@ -120,9 +118,7 @@ def share_inside(plan: FloorPlan, room: int, box: tuple[float, ...]) -> float:
     return float(np.mean((x0 < x) & (x < x1) & (y0 < y) & (y < y1)))
 
 
-def test_every_doorway_of_every_plan_crosses_free_space_from_wall_to_wall(
-    sample: list[Path],
-) -> None:
+def test_every_doorway_of_every_plan_crosses_free_space_from_wall_to_wall(sample):
     for path in sample:
         plan = read_houseexpo(path)
         free = shapely.MultiPolygon(plan.polygons)
@@ -200,14 +196,14 @@ DOORWAYS = {
 
 
 @pytest.mark.parametrize("name", list(ROOMS))
-def test_rooms_end_at_walls_and_doorways_join_them(plans: list[Path], name: str) -> None:
+def test_rooms_end_at_walls_and_doorways_join_them(plans, name):
     plan = read(plans, name)
 
     assert ROOMS[name] == {room.name: room.cells for room in plan.rooms}
     assert DOORWAYS[name] == {doorway.name for doorway in plan.doorways}
 
 
-def test_labels_of_658e(plans: list[Path]) -> None:
+def test_labels_of_658e(plans):
     plan = read(plans, "658e5214")
 
     assert (
@@ -223,7 +219,7 @@ def test_labels_of_658e(plans: list[Path]) -> None:
 
 
 @pytest.mark.slow
-def test_plan_that_touches_itself_is_read_with_a_note(plans: list[Path]) -> None:
+def test_plan_that_touches_itself_is_read_with_a_note(plans):
     plan = read(plans, "69c2ebf7")
 
     assert 260.08 == pytest.approx(plan.area_m2, abs=0.05)
@@ -233,7 +229,7 @@ def test_plan_that_touches_itself_is_read_with_a_note(plans: list[Path]) -> None
     )
 
 
-def test_the_largest_plan_fits_at_5_cm(plans: list[Path]) -> None:
+def test_the_largest_plan_fits_at_5_cm(plans):
     plan = read(plans, "f1ac9a2b")
 
     assert (2012, 1808) == (plan.lattice.columns, plan.lattice.rows)
@@ -243,31 +239,31 @@ def test_the_largest_plan_fits_at_5_cm(plans: list[Path]) -> None:
 # --- Odd outlines and boxes ---------------------------------------------------------------------
 
 
-def test_four_points_are_a_plan(tmp_path: Path) -> None:
+def test_four_points_are_a_plan(tmp_path):
     plan = home(tmp_path)
 
     assert ("plan", 12.0) == (plan.name, pytest.approx(plan.area_m2))
     assert "HouseExpo, plan.json" == plan.source
 
 
-def test_repeated_points_and_a_closing_point_change_nothing(tmp_path: Path) -> None:
+def test_repeated_points_and_a_closing_point_change_nothing(tmp_path):
     repeated = [[0, 0], [0, 0], [4, 0], [4, 3], [4, 3], [0, 3], [0, 0], [0, 0]]
 
     assert home(tmp_path) == home(tmp_path, verts=repeated)
 
 
-def test_either_direction_of_the_outline_is_the_same_plan(tmp_path: Path) -> None:
+def test_either_direction_of_the_outline_is_the_same_plan(tmp_path):
     assert home(tmp_path) == home(tmp_path, verts=SQUARE[::-1])
 
 
-def test_outline_that_crosses_itself_keeps_both_sides(tmp_path: Path) -> None:
+def test_outline_that_crosses_itself_keeps_both_sides(tmp_path):
     plan = home(tmp_path, verts=[[0, 0], [4, 4], [4, 0], [0, 4]])
 
     assert 8.0 == pytest.approx(plan.area_m2, abs=0.01)
     assert "crosses itself at (2, 2) m: everything inside it is free" in plan.notes[0]
 
 
-def test_outline_that_runs_over_itself_stays_free_there(tmp_path: Path) -> None:
+def test_outline_that_runs_over_itself_stays_free_there(tmp_path):
     twice = [[0, 0], [4, 0], [4, 3], [2, 3], [2, 1], [5, 1], [5, 2], [3, 2], [3, 4], [0, 4]]
 
     plan = home(tmp_path, verts=twice)
@@ -279,7 +275,7 @@ def test_outline_that_runs_over_itself_stays_free_there(tmp_path: Path) -> None:
     assert valid.area == pytest.approx(plan.area_m2, abs=0.01)
 
 
-def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path: Path) -> None:
+def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path):
     plan = home(tmp_path, room_category={"Hall": [[2, 3, 0, 0]], "Gym": [[2, 3, 4, 0]]})
 
     assert {"hall_1": 2400, "gym_1": 2400} == {room.name: room.cells for room in plan.rooms}
@@ -289,13 +285,13 @@ def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path: Path) -> None:
     )
 
 
-def test_categories_that_are_not_houseexpos_become_types_too(tmp_path: Path) -> None:
+def test_categories_that_are_not_houseexpos_become_types_too(tmp_path):
     plan = home(tmp_path, room_category={"Wine Cellar": [[0, 0, 4, 3]], "Attic": []})
 
     assert ["wine_cellar_1"] == [room.name for room in plan.rooms]
 
 
-def test_missing_categories_are_no_rooms(tmp_path: Path) -> None:
+def test_missing_categories_are_no_rooms(tmp_path):
     assert home(tmp_path) == home(tmp_path, room_category=None) == home(tmp_path, room_category={})
 
 
@@ -345,9 +341,7 @@ NAN, INFINITY = float("nan"), float("inf")
         ),
     ],
 )
-def test_json_that_is_no_plan_is_refused_with_the_place(
-    tmp_path: Path, content: object, message: str
-) -> None:
+def test_json_that_is_no_plan_is_refused_with_the_place(tmp_path, content, message):
     path = write(tmp_path, content)
 
     with pytest.raises(FloorPlanError, match=message) as caught:
@@ -366,7 +360,7 @@ def test_json_that_is_no_plan_is_refused_with_the_place(
         (b'{"verts":' + b"[" * 200_000, "is not a floor plan: it has lists in lists without end"),
     ],
 )
-def test_file_that_is_not_json_is_refused(tmp_path: Path, content: bytes, message: str) -> None:
+def test_file_that_is_not_json_is_refused(tmp_path, content, message):
     path = tmp_path / "plan.json"
     path.write_bytes(content)
 
@@ -374,7 +368,7 @@ def test_file_that_is_not_json_is_refused(tmp_path: Path, content: bytes, messag
         read_houseexpo(path)
 
 
-def test_text_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+def test_text_with_a_byte_order_mark_is_read(tmp_path):
     path = tmp_path / "plan.json"
     path.write_text(json.dumps({"verts": SQUARE}), encoding="utf-8-sig")
 
@@ -384,7 +378,7 @@ def test_text_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
 # --- The component ------------------------------------------------------------------------------
 
 
-def test_houseexpo_is_found_by_name(tmp_path: Path) -> None:
+def test_houseexpo_is_found_by_name(tmp_path):
     source = HouseExpo.model_validate(
         {"path": str(write(tmp_path, {"verts": SQUARE})), "cell": "10 cm"}
     )
@@ -393,7 +387,7 @@ def test_houseexpo_is_found_by_name(tmp_path: Path) -> None:
     assert 0.1 == source.load().lattice.cell
 
 
-def test_houseexpo_refuses_a_missing_path_and_unknown_keys(tmp_path: Path) -> None:
+def test_houseexpo_refuses_a_missing_path_and_unknown_keys(tmp_path):
     path = str(write(tmp_path, {"verts": SQUARE}))
 
     with pytest.raises(ValidationError, match="no such file"):

@@ -38,7 +38,7 @@ def pixels_of(shape: Polygon, pixel: float = 0.1) -> int:
 # --- Walls --------------------------------------------------------------------------------------
 
 
-def test_walls_are_the_sides_of_the_pixels_with_the_first_line_on_top() -> None:
+def test_walls_are_the_sides_of_the_pixels_with_the_first_line_on_top():
     free, notes = free_space(draw("####", "#..#", "#.##", "####"), **KEEP)
 
     assert free.normalize().equals_exact(
@@ -50,7 +50,7 @@ def test_walls_are_the_sides_of_the_pixels_with_the_first_line_on_top() -> None:
     assert [] == notes
 
 
-def test_unknown_inside_is_a_hole_with_a_note_of_its_length() -> None:
+def test_unknown_inside_is_a_hole_with_a_note_of_its_length():
     free, notes = free_space(draw("#####", "#...#", "#. .#", "#...#", "#####"), **KEEP)
 
     assert 1 == len(free.interiors)
@@ -58,7 +58,7 @@ def test_unknown_inside_is_a_hole_with_a_note_of_its_length() -> None:
     assert ["0.40 m of the walls are where free space meets unknown, without an obstacle"] == notes
 
 
-def test_pixels_that_share_only_a_corner_do_not_join() -> None:
+def test_pixels_that_share_only_a_corner_do_not_join():
     free, notes = free_space(draw("######", "#...##", "#####.", "######"), **KEEP)
 
     assert 3 == pixels_of(free)
@@ -66,7 +66,7 @@ def test_pixels_that_share_only_a_corner_do_not_join() -> None:
     assert "round (0.55, 0.15) m" in notes[0]
 
 
-def test_space_to_the_edge_of_the_image_ends_there_with_a_note() -> None:
+def test_space_to_the_edge_of_the_image_ends_there_with_a_note():
     free, notes = free_space(draw("...", "..."), **KEEP)
 
     assert 6 == pixels_of(free)
@@ -75,7 +75,7 @@ def test_space_to_the_edge_of_the_image_ends_there_with_a_note() -> None:
     ] == notes
 
 
-def test_a_map_with_nothing_free_is_refused() -> None:
+def test_a_map_with_nothing_free_is_refused():
     with pytest.raises(FloorPlanError, match="no pixel is free: check negate"):
         free_space(draw("###", "# #"), **KEEP)
 
@@ -83,7 +83,7 @@ def test_a_map_with_nothing_free_is_refused() -> None:
 # --- Specks -------------------------------------------------------------------------------------
 
 
-def test_specks_smaller_than_the_area_become_free_and_are_counted() -> None:
+def test_specks_smaller_than_the_area_become_free_and_are_counted():
     pixels = room(20, 20)
     pixels[5, 5:7] = "#"  # 0.02 m2
     pixels[10, 5:8] = "#"  # 0.03 m2
@@ -96,7 +96,7 @@ def test_specks_smaller_than_the_area_become_free_and_are_counted() -> None:
     assert "(0.03 m2 in all)" in notes[0]
 
 
-def test_specks_that_touch_something_stay() -> None:
+def test_specks_that_touch_something_stay():
     pixels = room(20, 20)
     pixels[2, 5] = "#"  # at the wall
     pixels[3, 10] = "#"
@@ -108,7 +108,7 @@ def test_specks_that_touch_something_stay() -> None:
     assert [] == notes
 
 
-def test_specks_stay_when_the_area_is_zero() -> None:
+def test_specks_stay_when_the_area_is_zero():
     pixels = room(20, 20)
     pixels[5, 5] = "#"
 
@@ -117,7 +117,7 @@ def test_specks_stay_when_the_area_is_zero() -> None:
     assert 1 == len(free.interiors)
 
 
-def test_specks_at_the_edge_of_the_image_stay() -> None:
+def test_specks_at_the_edge_of_the_image_stay():
     pixels = np.full((9, 9), ".")
     pixels[0, 4] = pixels[4, 4] = "#"
 
@@ -129,7 +129,7 @@ def test_specks_at_the_edge_of_the_image_stay() -> None:
 # --- Rays ---------------------------------------------------------------------------------------
 
 
-def test_rays_through_a_window_are_cut_off_just_behind_it() -> None:
+def test_rays_through_a_window_are_cut_off_just_behind_it():
     pixels = np.full((44, 60), " ")
     pixels[:24, :24] = room(20, 20)
     for k in range(22, 58):  # two rays through a gap of two pixels
@@ -143,7 +143,7 @@ def test_rays_through_a_window_are_cut_off_just_behind_it() -> None:
     assert "that only passages narrower than 0.3 m join to the rest" in notes[0]
 
 
-def test_room_behind_a_gap_narrower_than_rays_is_left_out_and_behind_a_wider_one_kept() -> None:
+def test_room_behind_a_gap_narrower_than_rays_is_left_out_and_behind_a_wider_one_kept():
     both = np.concatenate([room(20, 20), room(20, 10)], axis=1)
     wide, narrow = both.copy(), both.copy()
     wide[10:13, 22:26] = "."
@@ -157,7 +157,7 @@ def test_room_behind_a_gap_narrower_than_rays_is_left_out_and_behind_a_wider_one
     assert "2.06 m2 of free space, in pieces: 1, that only passages" in notes[0]
 
 
-def test_niches_and_corners_within_the_width_are_kept_whole() -> None:
+def test_niches_and_corners_within_the_width_are_kept_whole():
     pixels = room(20, 20)
     pixels[10, 22:25] = "."  # an opening two pixels deep into what is unknown
     pixels = np.pad(pixels, 2, constant_values=" ")
@@ -173,7 +173,7 @@ def test_niches_and_corners_within_the_width_are_kept_whole() -> None:
     assert 400 + 1 == pixels_of(cut)
 
 
-def test_slanted_corners_keep_every_pixel() -> None:
+def test_slanted_corners_keep_every_pixel():
     """An opening alone would round them off."""
     side = 40
     y, x = np.indices((side, side))
@@ -185,12 +185,12 @@ def test_slanted_corners_keep_every_pixel() -> None:
     assert [] == notes
 
 
-def test_space_narrower_than_rays_everywhere_is_refused() -> None:
+def test_space_narrower_than_rays_everywhere_is_refused():
     with pytest.raises(FloorPlanError, match=r"nowhere 0.3 m wide.*floorplan.ray_width"):
         free_space(draw("....", "    "), speck_area_m2=0.0, ray_width=0.3)
 
 
-def test_width_of_zero_keeps_all_that_is_connected() -> None:
+def test_width_of_zero_keeps_all_that_is_connected():
     free, notes = free_space(draw("#####.", "#....."), **KEEP)
 
     assert 6 == pixels_of(free)
@@ -201,7 +201,7 @@ def test_width_of_zero_keeps_all_that_is_connected() -> None:
 
 
 @pytest.mark.parametrize("ray_width", [0.0, 0.2, 0.3, 0.4, 0.55])
-def test_cleaning_is_the_same_on_every_side(ray_width: float) -> None:
+def test_cleaning_is_the_same_on_every_side(ray_width):
     """Known failure 15: erosion with even kernels gives a different clearance on each side."""
     rng = np.random.default_rng(5)
     pixels = np.pad(rng.choice([".", "#", " "], (60, 45), p=[0.9, 0.07, 0.03]), 1)
@@ -217,7 +217,7 @@ def test_cleaning_is_the_same_on_every_side(ray_width: float) -> None:
     assert 1 == len(areas) == len(holes) == len(notes)
 
 
-def test_random_maps_give_sound_polygons_of_whole_pixels() -> None:
+def test_random_maps_give_sound_polygons_of_whole_pixels():
     rng = np.random.default_rng(9)
     for _ in range(50):
         pixels = rng.choice([".", "#"], (25, 30), p=[0.7, 0.3])
@@ -231,7 +231,7 @@ def test_random_maps_give_sound_polygons_of_whole_pixels() -> None:
 # --- Where it is --------------------------------------------------------------------------------
 
 
-def test_origin_and_turn_place_the_lower_left_corner_and_turn_about_it() -> None:
+def test_origin_and_turn_place_the_lower_left_corner_and_turn_about_it():
     pixels = np.full((5, 7), "#")
     pixels[2, 3:5] = "."  # row 2 from below, columns 3 and 4
     turned = OccupancyMap(pixels == ".", pixels == "#", 0.5, (10.0, -20.0), (0.0, 1.0))

@@ -44,7 +44,7 @@ def write(folder: Path, content: object) -> Path:
 
 
 @pytest.mark.parametrize("wrap", [lambda m: m, lambda m: {"rand256": {"full_data": m}}])
-def test_raw_map_is_read_with_segments_charger_and_path(tmp_path: Path, wrap: Any) -> None:
+def test_raw_map_is_read_with_segments_charger_and_path(tmp_path, wrap):
     path = write(tmp_path, wrap(raw(forbidden_zones=[[25500, 25500, 25600, 25500, 25600, 25600]])))
 
     plan = Valetudo(path=path).load()
@@ -59,7 +59,7 @@ def test_raw_map_is_read_with_segments_charger_and_path(tmp_path: Path, wrap: An
 
 
 @pytest.mark.parametrize("wrap", [lambda m: m, lambda m: {"rand256": {"full_data": m}}])
-def test_raw_map_is_recognized_by_its_content(tmp_path: Path, wrap: Any) -> None:
+def test_raw_map_is_recognized_by_its_content(tmp_path, wrap):
     path = write(tmp_path, wrap(raw()))
 
     assert load_floorplan(path) == Valetudo(path=path).load()
@@ -76,14 +76,14 @@ def test_raw_map_is_recognized_by_its_content(tmp_path: Path, wrap: Any) -> None
         ({"image": {**image(), "segments": {}}}, "it has no floor"),
     ],
 )
-def test_damaged_raw_map_is_refused(tmp_path: Path, changes: Any, message: str) -> None:
+def test_damaged_raw_map_is_refused(tmp_path, changes, message):
     with pytest.raises(FloorPlanError) as caught:
         Valetudo(path=write(tmp_path, {"rand256": raw(**changes)})).load()
 
     assert message in str(caught.value)
 
 
-def test_vacuum_drove_on_the_floor_of_a_captured_map(shared_data: Path) -> None:
+def test_vacuum_drove_on_the_floor_of_a_captured_map(shared_data):
     path = shared_data / "captured" / "vacuum" / "rand256_raw.json"
     if not path.exists():
         pytest.skip(f"there is no {path}")

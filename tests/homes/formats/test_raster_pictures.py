@@ -40,9 +40,7 @@ def plain(values: NDArray[np.integer], white: int = 255) -> bytes:
 
 @pytest.mark.parametrize("encode", [packed, plain])
 @pytest.mark.parametrize(("factor", "white"), [(1, 255), (1, 220), (200, 65535), (1, 256)])
-def test_pgm_of_either_kind_and_depth_comes_back_as_written(
-    tmp_path: Path, encode: object, factor: int, white: int
-) -> None:
+def test_pgm_of_either_kind_and_depth_comes_back_as_written(tmp_path, encode, factor, white):
     values = SHADES.astype(np.int64) * factor
 
     picture = read_grey(write(tmp_path, encode(values, white)))  # type: ignore[operator]
@@ -61,19 +59,19 @@ def test_pgm_of_either_kind_and_depth_comes_back_as_written(
         b"P5\n4 3\n255# last\n",
     ],
 )
-def test_pgm_header_may_hold_comments_and_any_white_space(tmp_path: Path, header: bytes) -> None:
+def test_pgm_header_may_hold_comments_and_any_white_space(tmp_path, header):
     picture = read_grey(write(tmp_path, header + SHADES.tobytes()))
 
     assert np.array_equal(SHADES, picture.values)
 
 
-def test_packed_pixels_that_look_like_white_space_and_comments_are_pixels(tmp_path: Path) -> None:
+def test_packed_pixels_that_look_like_white_space_and_comments_are_pixels(tmp_path):
     values = np.frombuffer(b"# \n\r\t  #\n\n \n", np.uint8).reshape(3, 4)
 
     assert np.array_equal(values, read_grey(write(tmp_path, packed(values))).values)
 
 
-def test_plain_pixels_may_be_followed_by_comments(tmp_path: Path) -> None:
+def test_plain_pixels_may_be_followed_by_comments(tmp_path):
     content = plain(SHADES).replace(b"20 40", b"20 # 1 2 3\n40")
 
     assert np.array_equal(SHADES, read_grey(write(tmp_path, content)).values)
@@ -83,9 +81,7 @@ def test_plain_pixels_may_be_followed_by_comments(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("size", "message"), [(b"4 4", "it is cut off"), (b"4 2", "its header is wrong")]
 )
-def test_pgm_of_another_size_than_its_header_is_refused(
-    tmp_path: Path, encode: object, size: bytes, message: str
-) -> None:
+def test_pgm_of_another_size_than_its_header_is_refused(tmp_path, encode, size, message):
     content = encode(SHADES + 1).replace(b"4 3", size)  # type: ignore[operator]
 
     with pytest.raises(FloorPlanError, match=rf"holds 12 pixels.*{message}"):
@@ -113,9 +109,7 @@ def test_pgm_of_another_size_than_its_header_is_refused(
         (b"", "neither PGM"),
     ],
 )
-def test_damaged_or_foreign_image_is_refused_with_the_reason(
-    tmp_path: Path, content: bytes, message: str
-) -> None:
+def test_damaged_or_foreign_image_is_refused_with_the_reason(tmp_path, content, message):
     path = write(tmp_path, content)
 
     with pytest.raises(FloorPlanError, match=message) as caught:
@@ -124,7 +118,7 @@ def test_damaged_or_foreign_image_is_refused_with_the_reason(
     assert str(path) in str(caught.value)
 
 
-def test_folder_in_place_of_an_image_is_refused(tmp_path: Path) -> None:
+def test_folder_in_place_of_an_image_is_refused(tmp_path):
     with pytest.raises(FloorPlanError, match="is a folder"):
         read_grey(tmp_path)
 
@@ -133,7 +127,7 @@ def test_folder_in_place_of_an_image_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("mode", ["L", "RGB", "RGBA", "LA", "P", "I;16"])
-def test_png_of_any_kind_gives_its_shades(tmp_path: Path, mode: str) -> None:
+def test_png_of_any_kind_gives_its_shades(tmp_path, mode):
     images = pytest.importorskip("PIL.Image")
     path = tmp_path / "map.png"
     if mode == "I;16":
@@ -147,7 +141,7 @@ def test_png_of_any_kind_gives_its_shades(tmp_path: Path, mode: str) -> None:
     assert picture.clear is None
 
 
-def test_png_colours_are_averaged_and_what_is_not_opaque_is_clear(tmp_path: Path) -> None:
+def test_png_colours_are_averaged_and_what_is_not_opaque_is_clear(tmp_path):
     images = pytest.importorskip("PIL.Image")
     pixels = np.array([[[255, 0, 0, 255], [10, 20, 31, 254]]], np.uint8)
     images.fromarray(pixels).save(tmp_path / "map.png")
@@ -159,7 +153,7 @@ def test_png_colours_are_averaged_and_what_is_not_opaque_is_clear(tmp_path: Path
     assert [[False, True]] == picture.clear.tolist()
 
 
-def test_truncated_png_is_refused(tmp_path: Path) -> None:
+def test_truncated_png_is_refused(tmp_path):
     images = pytest.importorskip("PIL.Image")
     noise = np.random.default_rng(0).integers(0, 255, (60, 60)).astype(np.uint8)
     images.fromarray(noise).save(tmp_path / "map.png")
@@ -172,9 +166,7 @@ def test_truncated_png_is_refused(tmp_path: Path) -> None:
             read_grey(write(tmp_path, content[:length], "map.png"))
 
 
-def test_png_without_pillow_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_png_without_pillow_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "PIL", None)
     path = write(tmp_path, b"\x89PNG\r\n\x1a\n")
 

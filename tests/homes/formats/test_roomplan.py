@@ -50,7 +50,7 @@ def write(folder: Path, content: object) -> Path:
 
 
 @pytest.mark.parametrize("turn_deg", [0, 33])
-def test_scan_becomes_a_home_with_its_longest_wall_along_x(tmp_path: Path, turn_deg: float) -> None:
+def test_scan_becomes_a_home_with_its_longest_wall_along_x(tmp_path, turn_deg):
     plan = load_floorplan(write(tmp_path, scan(turn_deg)))
 
     assert plan.area_m2 == pytest.approx(2 * 3.95 * 4 + 0.1 * 0.9, abs=0.15)
@@ -61,7 +61,7 @@ def test_scan_becomes_a_home_with_its_longest_wall_along_x(tmp_path: Path, turn_
     assert (8.0, 4.0) == pytest.approx((x1 - x0, y1 - y0), abs=0.02)
 
 
-def test_furniture_has_the_names_of_the_catalogue_and_its_place(tmp_path: Path) -> None:
+def test_furniture_has_the_names_of_the_catalogue_and_its_place(tmp_path):
     content = scan()
     content["objects"].append(surface(1, 3.5, 0.7, depth=0.7, category="refrigerator"))
 
@@ -84,8 +84,8 @@ def test_furniture_has_the_names_of_the_catalogue_and_its_place(tmp_path: Path) 
     ids=["measured", "on legs", "low", "on the wall", "on a low stand", "of no known type"],
 )
 def test_furniture_is_as_high_above_the_floor_as_the_scan_says(
-    tmp_path: Path, category: str, high_m: float, begins_m: float, expected: float | None
-) -> None:
+    tmp_path, category, high_m, begins_m, expected
+):
     piece = surface(6, 3, 1.6, depth=0.5, category={category: {}})
     piece["dimensions"][1], piece["transform"][13] = high_m, begins_m + high_m / 2
     raised = {**scan(), "objects": [piece]}
@@ -99,9 +99,7 @@ def test_furniture_is_as_high_above_the_floor_as_the_scan_says(
 
 
 @pytest.mark.parametrize("turn_deg", [0, 33])
-def test_the_front_of_furniture_is_where_z_of_its_axes_points(
-    tmp_path: Path, turn_deg: float
-) -> None:
+def test_the_front_of_furniture_is_where_z_of_its_axes_points(tmp_path, turn_deg):
     plan = load_floorplan(write(tmp_path, scan(turn_deg)))
 
     assert 1.5 * math.pi == pytest.approx(plan.objects[0].heading, abs=1e-3)
@@ -116,7 +114,7 @@ def test_the_front_of_furniture_is_where_z_of_its_axes_points(
         ({"walls": [surface(0, 0, 4)]}, "no free space"),
     ],
 )
-def test_damaged_scan_is_refused(tmp_path: Path, change: dict[str, Any], message: str) -> None:
+def test_damaged_scan_is_refused(tmp_path, change, message):
     with pytest.raises(FloorPlanError) as caught:
         load_floorplan(write(tmp_path, {**scan(), **change}))
 
@@ -124,7 +122,7 @@ def test_damaged_scan_is_refused(tmp_path: Path, change: dict[str, Any], message
 
 
 @pytest.mark.parametrize("turn_deg", [0, 33])
-def test_one_sees_through_windows_between_rooms(tmp_path: Path, turn_deg: float) -> None:
+def test_one_sees_through_windows_between_rooms(tmp_path, turn_deg):
     content = scan(turn_deg)
     c, s = math.cos(math.radians(turn_deg)), math.sin(math.radians(turn_deg))
     content["windows"].append(surface(c * 4 + s * 3, -s * 4 + c * 3, 1.2, 90 + turn_deg))
@@ -178,7 +176,7 @@ def captured(k: int) -> tuple[dict[str, Any], bool]:
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
-def test_scans_of_any_turn_and_noise_are_the_home(tmp_path: Path, k: int) -> None:
+def test_scans_of_any_turn_and_noise_are_the_home(tmp_path, k):
     content, is_named = captured(k)
 
     plan = load_floorplan(write(tmp_path, content))
@@ -186,7 +184,7 @@ def test_scans_of_any_turn_and_noise_are_the_home(tmp_path: Path, k: int) -> Non
     check(plan, small_home(k), types=TYPES if is_named else ("unknown",) * 3, slack=0.02)
 
 
-def test_sections_of_one_open_room_are_its_functions(tmp_path: Path) -> None:
+def test_sections_of_one_open_room_are_its_functions(tmp_path):
     content = scan()
     content["walls"] = content["walls"][:4]
     content["doors"] = []
@@ -202,7 +200,7 @@ def test_sections_of_one_open_room_are_its_functions(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("in_degrees", [True, False])
-def test_a_curved_wall_is_curved(tmp_path: Path, in_degrees: bool) -> None:
+def test_a_curved_wall_is_curved(tmp_path, in_degrees):
     """A half-circle of 2 m radius in place of the wall at x = 8."""
     content = scan()
     content["doors"] = []
@@ -218,7 +216,7 @@ def test_a_curved_wall_is_curved(tmp_path: Path, in_degrees: bool) -> None:
     assert plan.area_m2 == pytest.approx(8 * 4 + math.pi * 2**2 / 2, abs=0.2)
 
 
-def test_where_walls_do_not_close_the_floor_bounds_the_room(tmp_path: Path) -> None:
+def test_where_walls_do_not_close_the_floor_bounds_the_room(tmp_path):
     corners = [(-4, -2, 0), (4, -2, 0), (4, 2, 0), (0, 2, 0), (0, 0, 0), (-4, 0, 0)]
     floor = surface(4, 2, 8)
     floor["transform"] = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 4, 0, 2, 1]
@@ -230,7 +228,7 @@ def test_where_walls_do_not_close_the_floor_bounds_the_room(tmp_path: Path) -> N
     assert plan.area_m2 == pytest.approx(24, abs=0.1)
 
 
-def test_stories_lie_side_by_side_and_stairs_join_them(tmp_path: Path) -> None:
+def test_stories_lie_side_by_side_and_stairs_join_them(tmp_path):
     content = scan()
     stairs = surface(6, 1.2, 1.0, depth=3.0, category={"stairs": {}}, story=0)
     for key in ("walls", "doors"):

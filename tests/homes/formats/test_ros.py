@@ -80,9 +80,7 @@ def refusal(path: Path, **options: Any) -> str:
     ("folder", "area", "specks", "left_out"),
     [("aws_small_house", 155.5, 29, 0.56 + 1.76), ("turtlebot3_house", 19.8, 0, 0.01)],
 )
-def test_real_maps_load_with_every_pixel_accounted_for(
-    shared_data: Path, folder: str, area: float, specks: int, left_out: float
-) -> None:
+def test_real_maps_load_with_every_pixel_accounted_for(shared_data, folder, area, specks, left_out):
     path = shared_data / "ros_maps" / folder / "map.yaml"
     content = (path.parent / "map.pgm").read_bytes()
     free_m2 = content.partition(b"\n255\n")[2].count(FREE) * 0.05**2
@@ -101,9 +99,7 @@ def test_real_maps_load_with_every_pixel_accounted_for(
 
 
 @pytest.mark.parametrize("folder", ["aws_small_house", "turtlebot3_house"])
-def test_real_maps_have_their_walls_on_the_sides_of_the_pixels(
-    shared_data: Path, folder: str
-) -> None:
+def test_real_maps_have_their_walls_on_the_sides_of_the_pixels(shared_data, folder):
     plan = read_ros(shared_data / "ros_maps" / folder / "map.yaml")
 
     assert not (shapely.get_coordinates(plan.polygons) % 64).any()
@@ -112,9 +108,7 @@ def test_real_maps_have_their_walls_on_the_sides_of_the_pixels(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", ["aws_small_house", "turtlebot3_house"])
-def test_real_maps_have_the_same_area_turned_and_mirrored(
-    shared_data: Path, tmp_path: Path, folder: str
-) -> None:
+def test_real_maps_have_the_same_area_turned_and_mirrored(shared_data, tmp_path, folder):
     content = (shared_data / "ros_maps" / folder / "map.pgm").read_bytes()
     body = content.partition(b"\n255\n")[2]
     side = math.isqrt(len(body))
@@ -130,7 +124,7 @@ def test_real_maps_have_the_same_area_turned_and_mirrored(
 
 
 @pytest.mark.parametrize("folder", ["aws_small_house", "turtlebot3_house"])
-def test_a_robot_reaches_nearly_all_of_the_real_maps(shared_data: Path, folder: str) -> None:
+def test_a_robot_reaches_nearly_all_of_the_real_maps(shared_data, folder):
     plan = read_ros(shared_data / "ros_maps" / folder / "map.yaml")
 
     space = Space(plan, 0.2)
@@ -143,7 +137,7 @@ def test_a_robot_reaches_nearly_all_of_the_real_maps(shared_data: Path, folder: 
 # --- Where the map is ---------------------------------------------------------------------------
 
 
-def test_first_row_of_the_image_is_the_top_and_origin_the_lower_left(tmp_path: Path) -> None:
+def test_first_row_of_the_image_is_the_top_and_origin_the_lower_left(tmp_path):
     plan = read_ros(write(tmp_path, origin=[-3.0, 7.0, 0.0]))
 
     assert (-2.9, 7.1, -0.9, 8.6) == pytest.approx(plan.bounds)
@@ -153,7 +147,7 @@ def test_first_row_of_the_image_is_the_top_and_origin_the_lower_left(tmp_path: P
 
 
 @pytest.mark.parametrize("yaw", ["-nan", ".nan", "nan", "-.NaN"])
-def test_yaw_that_is_no_number_is_none_with_a_note(tmp_path: Path, yaw: str) -> None:
+def test_yaw_that_is_no_number_is_none_with_a_note(tmp_path, yaw):
     """`map_saver` wrote `-nan` for none: ros-planning/navigation#993."""
     plan = load_floorplan(write(tmp_path, origin=f"[-15.4, -30.9, {yaw}]"))
 
@@ -163,7 +157,7 @@ def test_yaw_that_is_no_number_is_none_with_a_note(tmp_path: Path, yaw: str) -> 
 
 
 @pytest.mark.parametrize("yaw", [0.3, math.pi / 2, math.pi, -2.0])
-def test_yaw_turns_the_map_about_its_origin(tmp_path: Path, yaw: float) -> None:
+def test_yaw_turns_the_map_about_its_origin(tmp_path, yaw):
     origin, at = np.array([2.0, -1.0]), np.array([2.0, 0.2])  # lower right; (2, 1.4) is upper right
 
     plan = read_ros(write(tmp_path, origin=[*origin.tolist(), yaw]))
@@ -175,13 +169,13 @@ def test_yaw_turns_the_map_about_its_origin(tmp_path: Path, yaw: float) -> None:
         assert inside == (plan.room_at(x, y) is not None), place
 
 
-def test_quarter_turns_are_exact(tmp_path: Path) -> None:
+def test_quarter_turns_are_exact(tmp_path):
     plan = read_ros(write(tmp_path, origin=[0.0, 0.0, math.pi / 2]))
 
     assert not (shapely.get_coordinates(plan.polygons) % 64).any()
 
 
-def test_origin_between_cells_moves_walls_by_less_than_the_lattice(tmp_path: Path) -> None:
+def test_origin_between_cells_moves_walls_by_less_than_the_lattice(tmp_path):
     plan = read_ros(write(tmp_path, origin=[-3.2718, 1.0123, 0.0]))
 
     assert 2.5 == pytest.approx(plan.area_m2, rel=1e-9)
@@ -191,7 +185,7 @@ def test_origin_between_cells_moves_walls_by_less_than_the_lattice(tmp_path: Pat
 # --- Cells --------------------------------------------------------------------------------------
 
 
-def test_cell_is_the_resolution_by_default(tmp_path: Path) -> None:
+def test_cell_is_the_resolution_by_default(tmp_path):
     path = write(tmp_path, resolution=0.04)
 
     assert 0.04 == read_ros(path).lattice.cell
@@ -199,7 +193,7 @@ def test_cell_is_the_resolution_by_default(tmp_path: Path) -> None:
     assert read_ros(path).area_m2 == pytest.approx(read_ros(path, 0.1).area_m2)
 
 
-def test_resolution_below_the_smallest_cell_takes_that(tmp_path: Path) -> None:
+def test_resolution_below_the_smallest_cell_takes_that(tmp_path):
     plan = read_ros(write(tmp_path, resolution=0.005), ray_width=0.03)
 
     assert 0.01 == plan.lattice.cell
@@ -209,7 +203,7 @@ def test_resolution_below_the_smallest_cell_takes_that(tmp_path: Path) -> None:
 # --- Free, occupied, unknown --------------------------------------------------------------------
 
 
-def test_negate_makes_white_occupied(tmp_path: Path) -> None:
+def test_negate_makes_white_occupied(tmp_path):
     plain = read_ros(write(tmp_path))
 
     assert plain == read_ros(write(tmp_path, 255 - ROOM, negate=1))
@@ -217,9 +211,7 @@ def test_negate_makes_white_occupied(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("free_thresh", "free"), [(0.1, False), (100 / 255, False), (0.393, True)])
-def test_pixels_are_free_below_free_thresh_only(
-    tmp_path: Path, free_thresh: float, free: bool
-) -> None:
+def test_pixels_are_free_below_free_thresh_only(tmp_path, free_thresh, free):
     pixels = ROOM.copy()
     pixels[20:30, 20:30] = 155  # a chance of 100/255 = 0.392 of being occupied
 
@@ -228,7 +220,7 @@ def test_pixels_are_free_below_free_thresh_only(
     assert free == (plan.area_m2 > 2.4)
 
 
-def test_occupied_thresh_tells_obstacles_from_unknown(tmp_path: Path) -> None:
+def test_occupied_thresh_tells_obstacles_from_unknown(tmp_path):
     pixels = ROOM.copy()
     pixels[20:30, 20:30] = 155
 
@@ -243,9 +235,7 @@ def test_occupied_thresh_tells_obstacles_from_unknown(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("unknown", "free_thresh"), [(UNKNOWN, 0.25), (UNKNOWN, 0.3), (220, 0.196), (150, 0.45)]
 )
-def test_grey_of_unknown_is_not_floor_though_the_threshold_says_so(
-    tmp_path: Path, unknown: int, free_thresh: float
-) -> None:
+def test_grey_of_unknown_is_not_floor_though_the_threshold_says_so(tmp_path, unknown, free_thresh):
     pixels = np.where(ROOM == UNKNOWN, unknown, ROOM).astype(np.uint8)
     expected = read_ros(write(tmp_path))
 
@@ -255,7 +245,7 @@ def test_grey_of_unknown_is_not_floor_though_the_threshold_says_so(
     assert f"grey {unknown} is taken for unknown" in plan.notes[0]
 
 
-def test_grey_of_unknown_in_the_middle_of_a_map_is_no_floor(tmp_path: Path) -> None:
+def test_grey_of_unknown_in_the_middle_of_a_map_is_no_floor(tmp_path):
     pixels = ROOM.copy()
     pixels[[0, -1]], pixels[:, [0, -1]] = OCCUPIED, OCCUPIED
     pixels[20:26, 30:36] = UNKNOWN  # in the floor
@@ -265,9 +255,7 @@ def test_grey_of_unknown_in_the_middle_of_a_map_is_no_floor(tmp_path: Path) -> N
     assert plan.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
 
 
-def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chances_are(
-    tmp_path: Path,
-) -> None:
+def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chances_are(tmp_path):
     pixels = np.full((60, 80), UNKNOWN, np.uint8)
     pixels[5:-5, 5:-5] = FREE
     pixels[20:30, 20:40] = 211  # a sofa of 0.5 m x 1 m
@@ -283,7 +271,7 @@ def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chance
     assert "grey 211 is taken for unknown" in filled.notes[0]
 
 
-def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path: Path) -> None:
+def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path):
     pixels = ROOM.copy()
     pixels[20:26, 30:36] = 230
 
@@ -298,8 +286,8 @@ def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path: Path) -> 
 @pytest.mark.parametrize("ground", [255, 240, 215])
 @pytest.mark.parametrize("settings", [{}, {"unknown_grey": "none"}, {"unknown_grey": "ground"}])
 def test_ground_as_light_as_the_floor_is_refused_without_a_key_that_would_not_help(
-    tmp_path: Path, ground: int, settings: dict
-) -> None:
+    tmp_path, ground, settings
+):
     pixels = np.full((60, 80), ground, np.uint8)
     pixels[20:40, 20:40] = OCCUPIED
     if settings.get("unknown_grey") == "ground":
@@ -312,7 +300,7 @@ def test_ground_as_light_as_the_floor_is_refused_without_a_key_that_would_not_he
     assert "set floorplan.unknown_grey" not in message
 
 
-def test_ground_that_is_darker_than_the_floor_is_refused_with_what_to_type(tmp_path: Path) -> None:
+def test_ground_that_is_darker_than_the_floor_is_refused_with_what_to_type(tmp_path):
     pixels = np.full((60, 80), 230, np.uint8)
     pixels[20:58, 10:70] = OCCUPIED
     pixels[22:56, 12:68] = FREE
@@ -326,9 +314,7 @@ def test_ground_that_is_darker_than_the_floor_is_refused_with_what_to_type(tmp_p
 
 
 @pytest.mark.parametrize("name", ["aws_small_house", "turtlebot3_house"])
-def test_real_maps_are_the_same_at_the_threshold_of_other_map_savers(
-    shared_data: Path, tmp_path: Path, name: str
-) -> None:
+def test_real_maps_are_the_same_at_the_threshold_of_other_map_savers(shared_data, tmp_path, name):
     folder = shared_data / "ros_maps" / name
     keys = yaml.safe_load((folder / "map.yaml").read_text(encoding="utf-8"))
     keys |= {"free_thresh": 0.25, "image": str((folder / keys["image"]).resolve())}
@@ -337,11 +323,11 @@ def test_real_maps_are_the_same_at_the_threshold_of_other_map_savers(
     assert read_ros(tmp_path / "map.yaml") == read_ros(folder / "map.yaml")
 
 
-def test_scale_mode_takes_what_is_between_for_unknown(tmp_path: Path) -> None:
+def test_scale_mode_takes_what_is_between_for_unknown(tmp_path):
     assert read_ros(write(tmp_path)) == read_ros(write(tmp_path, mode="scale"))
 
 
-def test_raw_mode_takes_values_for_percent_and_those_above_100_for_unknown(tmp_path: Path) -> None:
+def test_raw_mode_takes_values_for_percent_and_those_above_100_for_unknown(tmp_path):
     percent = np.select([ROOM == FREE, ROOM == OCCUPIED], [0, 100], 255).astype(np.uint8)
     percent[20:30, 20:30] = 19  # just below free_thresh
     percent[15, 25:29] = 20
@@ -352,7 +338,7 @@ def test_raw_mode_takes_values_for_percent_and_those_above_100_for_unknown(tmp_p
     assert read_ros(write(tmp_path)) == read_ros(write(tmp_path, percent, mode="raw"))
 
 
-def test_transparent_pixels_of_a_png_are_unknown(tmp_path: Path) -> None:
+def test_transparent_pixels_of_a_png_are_unknown(tmp_path):
     images = pytest.importorskip("PIL.Image")
     pixels = np.dstack([ROOM, ROOM, ROOM, np.full_like(ROOM, 255)])
     pixels[20:30, 20:30, 3] = 0
@@ -366,7 +352,7 @@ def test_transparent_pixels_of_a_png_are_unknown(tmp_path: Path) -> None:
 # --- Cleaning and straightening -----------------------------------------------------------------
 
 
-def test_cleaning_is_tuned_by_the_component(tmp_path: Path) -> None:
+def test_cleaning_is_tuned_by_the_component(tmp_path):
     pixels = ROOM.copy()
     pixels[25, 25:29] = OCCUPIED  # 0.01 m2
     pixels[20:22, 42:44] = FREE  # a gap in the wall, to the edge of the image
@@ -381,7 +367,7 @@ def test_cleaning_is_tuned_by_the_component(tmp_path: Path) -> None:
     assert 1 == len(plan.polygons[0].interiors)
 
 
-def test_simplify_straightens_jagged_walls_within_the_tolerance(tmp_path: Path) -> None:
+def test_simplify_straightens_jagged_walls_within_the_tolerance(tmp_path):
     y, x = np.indices((60, 60))
     pixels = np.where((x > 1) & (y > 1) & (x + 2 * y < 100), FREE, OCCUPIED).astype(np.uint8)
     path = write(tmp_path, pixels)
@@ -406,7 +392,7 @@ def test_simplify_straightens_jagged_walls_within_the_tolerance(tmp_path: Path) 
 # --- Finding the image --------------------------------------------------------------------------
 
 
-def test_image_may_be_absolute(tmp_path: Path) -> None:
+def test_image_may_be_absolute(tmp_path):
     home = tmp_path / "home"
     home.mkdir()
     write(tmp_path)
@@ -418,20 +404,20 @@ def test_image_may_be_absolute(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("image", ["/home/robot/maps/map.pgm", "C:\\maps\\map.pgm"])
 def test_image_path_of_another_computer_is_replaced_by_the_file_beside_the_map_with_a_note(
-    tmp_path: Path, image: str
-) -> None:
+    tmp_path, image
+):
     plan = read_ros(write(tmp_path, image=image))
 
     assert f"there is no image {image}: map.pgm beside map.yaml is used instead" == plan.notes[0]
 
 
-def test_missing_image_is_refused(tmp_path: Path) -> None:
+def test_missing_image_is_refused(tmp_path):
     path = write(tmp_path, image="other.pgm")
 
     assert f"there is no image {tmp_path / 'other.pgm'}" in refusal(path)
 
 
-def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> None:
+def test_image_of_another_size_than_its_header_is_refused(tmp_path):
     path = write(tmp_path)
     (tmp_path / "map.pgm").write_bytes(pgm(ROOM)[:-100])
 
@@ -475,9 +461,7 @@ def test_image_of_another_size_than_its_header_is_refused(tmp_path: Path) -> Non
         ({"resolution": 0.005}, "the free space is nowhere 0.3 m wide"),
     ],
 )
-def test_wrong_settings_are_refused_with_the_reason(
-    tmp_path: Path, changes: dict[str, Any], message: str
-) -> None:
+def test_wrong_settings_are_refused_with_the_reason(tmp_path, changes, message):
     assert message in refusal(write(tmp_path, **changes))
 
 
@@ -493,20 +477,20 @@ def test_wrong_settings_are_refused_with_the_reason(
         (b"mode: inorder\nposes: []\n", "not a ROS map: the key 'image' is missing"),
     ],
 )
-def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
+def test_other_files_are_refused(tmp_path, content, message):
     path = tmp_path / "map.yaml"
     path.write_bytes(content)
 
     assert message in refusal(path)
 
 
-def test_map_too_large_for_the_cells_is_refused(tmp_path: Path) -> None:
+def test_map_too_large_for_the_cells_is_refused(tmp_path):
     path = write(tmp_path, np.pad(np.full((18, 17_000), FREE, np.uint8), 1))
 
     assert "too large for cells of 0.05 m" in refusal(path)
 
 
-def test_resolution_with_an_exponent_is_a_number(tmp_path: Path) -> None:
+def test_resolution_with_an_exponent_is_a_number(tmp_path):
     """YAML 1.1 takes 5e-2 for text."""
     assert 0.05 == read_ros(write(tmp_path, resolution="5e-2")).lattice.cell
 
@@ -514,7 +498,7 @@ def test_resolution_with_an_exponent_is_a_number(tmp_path: Path) -> None:
 # --- As a component, and by its file ------------------------------------------------------------
 
 
-def test_component_is_found_and_holds_the_cell_for_the_manifest(tmp_path: Path) -> None:
+def test_component_is_found_and_holds_the_cell_for_the_manifest(tmp_path):
     path = write(tmp_path, resolution=0.04)
 
     source = Ros(path=path)
@@ -527,7 +511,7 @@ def test_component_is_found_and_holds_the_cell_for_the_manifest(tmp_path: Path) 
     assert read_ros(path) == source.load()
 
 
-def test_component_of_a_broken_map_says_so_when_it_loads(tmp_path: Path) -> None:
+def test_component_of_a_broken_map_says_so_when_it_loads(tmp_path):
     source = Ros(path=write(tmp_path, resolution=0))
 
     with pytest.raises(FloorPlanError, match="resolution is 0"):
@@ -535,8 +519,8 @@ def test_component_of_a_broken_map_says_so_when_it_loads(tmp_path: Path) -> None
 
 
 def test_home_found_in_a_map_that_is_just_not_too_large_is_read_after_it_is_saved(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     """Its rooms have twice the corners of its walls: runs in such homes could not be opened."""
     y, x = np.indices((120, 60))
     pixels = np.where((x > 1) & (y > 1) & (x + 2 * y < 260), FREE, OCCUPIED).astype(np.uint8)
@@ -551,9 +535,7 @@ def test_home_found_in_a_map_that_is_just_not_too_large_is_read_after_it_is_save
     assert plan == load_floorplan(tmp_path / "home.json")
 
 
-def test_map_with_too_many_corners_is_straightened_by_a_pixel(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_map_with_too_many_corners_is_straightened_by_a_pixel(tmp_path, monkeypatch):
     """A scanned building that wasn't turned to its walls was refused: each pixel is a corner."""
     y, x = np.indices((60, 60))
     pixels = np.where((x > 1) & (y > 1) & (x + 2 * y < 100), FREE, OCCUPIED).astype(np.uint8)
@@ -572,26 +554,26 @@ def test_map_with_too_many_corners_is_straightened_by_a_pixel(
 
 
 @pytest.mark.parametrize("key", ["speck_area_m2", "ray_width", "simplify"])
-def test_negative_cleaning_is_refused(tmp_path: Path, key: str) -> None:
+def test_negative_cleaning_is_refused(tmp_path, key):
     with pytest.raises(ValidationError, match=key):
         Ros(path=write(tmp_path), **{key: -1})
 
 
-def test_load_floorplan_knows_a_map_by_its_file(tmp_path: Path) -> None:
+def test_load_floorplan_knows_a_map_by_its_file(tmp_path):
     path = write(tmp_path, resolution=0.04)
 
     assert read_ros(path) == load_floorplan(path)
     assert 0.1 == load_floorplan(path, 0.1).lattice.cell
 
 
-def test_load_floorplan_of_the_image_names_the_yaml_file(tmp_path: Path) -> None:
+def test_load_floorplan_of_the_image_names_the_yaml_file(tmp_path):
     write(tmp_path)
 
     with pytest.raises(FloorPlanError, match=r"name the YAML file.*map\.yaml"):
         load_floorplan(tmp_path / "map.pgm")
 
 
-def test_a_run_notes_the_image_as_well_as_the_yaml(shared_data: Path) -> None:
+def test_a_run_notes_the_image_as_well_as_the_yaml(shared_data):
     path = shared_data / "ros_maps" / "turtlebot3_house" / "map.yaml"
     overrides = ("floorplan.type=ros", f"floorplan.path={path}", "simulation.duration=1 min")
     inputs = fleet2d.run("bundled:paper", *overrides).manifest["inputs"]

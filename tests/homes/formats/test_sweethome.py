@@ -41,7 +41,7 @@ def write(folder: Path, *content: str) -> Path:
     return path
 
 
-def test_rooms_walls_doors_and_furniture_become_a_home(tmp_path: Path) -> None:
+def test_rooms_walls_doors_and_furniture_become_a_home(tmp_path):
     plan = load_floorplan(write(tmp_path, WALLS, ROOMS, DOOR, WINDOW, BED))
 
     assert "flat" == plan.name
@@ -73,31 +73,27 @@ def piece(name: str, height: float, *, elevation: float = 0, angle: float = 0) -
     ],
     ids=["measured", "on a podium", "on legs", "of no known type", "damaged", "none in the file"],
 )
-def test_furniture_is_as_high_as_the_file_says(
-    tmp_path: Path, element: str, height: float | None
-) -> None:
+def test_furniture_is_as_high_as_the_file_says(tmp_path, element, height):
     plan = load_floorplan(write(tmp_path, WALLS, ROOMS, element))
 
     assert [height] == [thing.height for thing in plan.objects]
 
 
 @pytest.mark.parametrize(("angle", "heading"), [(0, 1.5 * math.pi), (math.pi / 2, math.pi)])
-def test_the_front_of_furniture_is_its_lower_side_turned_clockwise(
-    tmp_path: Path, angle: float, heading: float
-) -> None:
+def test_the_front_of_furniture_is_its_lower_side_turned_clockwise(tmp_path, angle, heading):
     plan = load_floorplan(write(tmp_path, WALLS, ROOMS, piece("Sofa", 80, angle=angle)))
 
     assert heading == pytest.approx(plan.objects[0].heading, abs=1e-5)
 
 
-def test_walls_alone_enclose_the_home(tmp_path: Path) -> None:
+def test_walls_alone_enclose_the_home(tmp_path):
     plan = load_floorplan(write(tmp_path, WALLS, DOOR))
 
     assert plan.area_m2 == pytest.approx(2 * 3.9 * 3.9 + 0.1 * 0.9, abs=0.1)
     assert 2 == len(plan.rooms)
 
 
-def test_level_is_chosen_by_name_and_else_all_lie_side_by_side(tmp_path: Path) -> None:
+def test_level_is_chosen_by_name_and_else_all_lie_side_by_side(tmp_path):
     levels = (
         '<level id="a" name="Cellar" elevation="-250"/><level id="b" name="Ground" elevation="0"/>'
     )
@@ -124,7 +120,7 @@ def test_level_is_chosen_by_name_and_else_all_lie_side_by_side(tmp_path: Path) -
         ('<home><wall xStart="nan" yStart="0" xEnd="1" yEnd="1"/></home>', "a number is expected"),
     ],
 )
-def test_damaged_file_is_refused(tmp_path: Path, content: str, message: str) -> None:
+def test_damaged_file_is_refused(tmp_path, content, message):
     path = tmp_path / "Home.xml"
     path.write_text(content)
 
@@ -135,7 +131,7 @@ def test_damaged_file_is_refused(tmp_path: Path, content: str, message: str) -> 
     assert "Home.xml" in str(caught.value)
 
 
-def test_one_sees_through_low_windows_between_rooms_only(tmp_path: Path) -> None:
+def test_one_sees_through_low_windows_between_rooms_only(tmp_path):
     inner = WINDOW.replace('x="0" y="200"', 'x="400" y="80"')
     plan = load_floorplan(write(tmp_path, WALLS, ROOMS, DOOR, WINDOW, inner))
     high = load_floorplan(
@@ -148,7 +144,7 @@ def test_one_sees_through_low_windows_between_rooms_only(tmp_path: Path) -> None
     assert () == high.glass
 
 
-def test_levels_of_one_name_are_told_apart_by_their_ids() -> None:
+def test_levels_of_one_name_are_told_apart_by_their_ids():
     levels = [Storey("a", "Floor", 0.0), Storey("b", "Floor", 2.62)]
 
     assert choose_storey(levels, "b").key == "b"
@@ -202,7 +198,7 @@ def house(k: int) -> tuple[str, int]:
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
-def test_houses_of_any_storeys_language_and_turn_are_the_home(tmp_path: Path, k: int) -> None:
+def test_houses_of_any_storeys_language_and_turn_are_the_home(tmp_path, k):
     content, storeys = house(k)
     path = tmp_path / ("Home.xml", "house.sh3d")[k % 2]
     if k % 2:
@@ -219,7 +215,7 @@ def test_houses_of_any_storeys_language_and_turn_are_the_home(tmp_path: Path, k:
 
 
 @pytest.mark.parametrize("degrees", [-150, -90, -30, 10, 45, 90, 120, 179, 200, 270])
-def test_round_walls_bulge_by_their_arc(tmp_path: Path, degrees: float) -> None:
+def test_round_walls_bulge_by_their_arc(tmp_path, degrees):
     """The area changes by the segment of the circle; rooms reach to the wall."""
     angle = math.radians(degrees)
     sides = [(0, 0, 800, 0), (800, 0, 800, 1400), (800, 1400, 0, 1400), (0, 1400, 0, 0)]
@@ -243,9 +239,7 @@ def test_round_walls_bulge_by_their_arc(tmp_path: Path, degrees: float) -> None:
 
 
 @pytest.mark.parametrize(("y", "moved"), [(150, True), (160, True), (260, False)])
-def test_a_door_that_a_round_wall_covers_is_moved_to_where_it_opens(
-    tmp_path: Path, y: float, moved: bool
-) -> None:
+def test_a_door_that_a_round_wall_covers_is_moved_to_where_it_opens(tmp_path, y, moved):
     arc = WALLS.replace('yEnd="0" thickness', 'yEnd="0" arcExtent="-1.5708" thickness', 1)
     plan = load_floorplan(write(tmp_path, arc, ROOMS, DOOR.replace('y="200"', f'y="{y}"')))
 
@@ -255,7 +249,7 @@ def test_a_door_that_a_round_wall_covers_is_moved_to_where_it_opens(
     assert 1 == fleet2d.Home(plan).space(0.2).parts
 
 
-def test_a_home_of_an_older_program_says_how_to_save_it(tmp_path: Path) -> None:
+def test_a_home_of_an_older_program_says_how_to_save_it(tmp_path):
     with ZipFile(tmp_path / "old.sh3d", "w") as archive:
         archive.writestr("Home", b"\xac\xed\x00\x05")
 
@@ -263,7 +257,7 @@ def test_a_home_of_an_older_program_says_how_to_save_it(tmp_path: Path) -> None:
         load_floorplan(tmp_path / "old.sh3d")
 
 
-def test_an_archive_that_unpacks_to_gigabytes_is_refused(tmp_path: Path) -> None:
+def test_an_archive_that_unpacks_to_gigabytes_is_refused(tmp_path):
     with ZipFile(tmp_path / "bomb.sh3d", "w", ZIP_DEFLATED) as archive:
         archive.writestr("Home.xml", b" " * (65 << 20))
 

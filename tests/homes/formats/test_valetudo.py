@@ -139,9 +139,7 @@ def pixels_of(content: dict[str, Any], *kinds: str) -> set[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_real_map_has_exactly_the_pixels_of_the_file_and_rooms_that_cover_them(
-    shared_data: Path, name: str
-) -> None:
+def test_real_map_has_exactly_the_pixels_of_the_file_and_rooms_that_cover_them(shared_data, name):
     path = shared_data / "valetudo" / f"{name}.json"
     content = json.loads(path.read_text())
     floor = pixels_of(content, "floor", "segment") - pixels_of(content, "wall")
@@ -160,9 +158,7 @@ def test_real_map_has_exactly_the_pixels_of_the_file_and_rooms_that_cover_them(
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_real_segments_are_rooms_of_the_area_that_the_file_states(
-    shared_data: Path, name: str
-) -> None:
+def test_real_segments_are_rooms_of_the_area_that_the_file_states(shared_data, name):
     path = shared_data / "valetudo" / f"{name}.json"
     content = json.loads(path.read_text())
     segments = [item for item in content["layers"] if item["type"] == "segment"]
@@ -185,7 +181,7 @@ def test_real_segments_are_rooms_of_the_area_that_the_file_states(
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_real_path_runs_on_the_floor_of_the_plan(shared_data: Path, name: str) -> None:
+def test_real_path_runs_on_the_floor_of_the_plan(shared_data, name):
     """Entities and pixels share a frame: a mirrored or shifted path would leave the floor."""
     path = shared_data / "valetudo" / f"{name}.json"
     plan = read_valetudo(path)
@@ -200,7 +196,7 @@ def test_real_path_runs_on_the_floor_of_the_plan(shared_data: Path, name: str) -
     assert np.hypot(*np.subtract(charger, plan.nearest_free(*charger))) < 0.35
 
 
-def test_real_map_with_german_names_has_rooms_of_known_types(shared_data: Path) -> None:
+def test_real_map_with_german_names_has_rooms_of_known_types(shared_data):
     plan = read_valetudo(shared_data / "valetudo" / f"{MAPS[2]}.json")
 
     expected = {
@@ -216,7 +212,7 @@ def test_real_map_with_german_names_has_rooms_of_known_types(shared_data: Path) 
     assert expected == {room.name: room.type for room in plan.rooms}
 
 
-def test_real_no_go_area_is_an_area_and_no_wall(shared_data: Path) -> None:
+def test_real_no_go_area_is_an_area_and_no_wall(shared_data):
     path = shared_data / "valetudo" / "roborock_s6_segments.json"
 
     plan, open_plan = read_valetudo(path), read_valetudo(path, no_go="ignore")
@@ -227,7 +223,7 @@ def test_real_no_go_area_is_an_area_and_no_wall(shared_data: Path) -> None:
     assert np.array_equal(plan.room_of_cell, open_plan.room_of_cell)
 
 
-def test_real_no_go_area_can_be_a_wall(shared_data: Path) -> None:
+def test_real_no_go_area_can_be_a_wall(shared_data):
     path = shared_data / "valetudo" / "roborock_s6_segments.json"
     area = shapely.box(25.0, -24.1, 27.2, -23.2)
 
@@ -240,9 +236,7 @@ def test_real_no_go_area_can_be_a_wall(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_real_map_comes_back_from_our_own_format(
-    shared_data: Path, tmp_path: Path, name: str
-) -> None:
+def test_real_map_comes_back_from_our_own_format(shared_data, tmp_path, name):
     plan = read_valetudo(shared_data / "valetudo" / f"{name}.json")
 
     assert plan == read_native(write(tmp_path, native_document(plan)))
@@ -251,34 +245,34 @@ def test_real_map_comes_back_from_our_own_format(
 # --- Free space ---------------------------------------------------------------------------------
 
 
-def test_pixels_become_metres_with_y_upwards(tmp_path: Path) -> None:
+def test_pixels_become_metres_with_y_upwards(tmp_path):
     """Pixel (10, 20) covers 50 to 55 cm and 100 to 105 cm down."""
     plan = home(tmp_path, layer("floor", runs(10, 20, 30, 24)))
 
     assert_box((0.5, -1.2, 1.5, -1.0), plan)
 
 
-def test_upper_rows_of_the_file_have_the_higher_y(tmp_path: Path) -> None:
+def test_upper_rows_of_the_file_have_the_higher_y(tmp_path):
     plan = home(tmp_path, KITCHEN, FLOOR)
 
     kitchen, floor = plan.room("Kitchen"), plan.room("unknown_1")
     assert kitchen.anchor_xy[1] > floor.anchor_xy[1]
 
 
-def test_raw_pixels_and_runs_are_the_same(tmp_path: Path) -> None:
+def test_raw_pixels_and_runs_are_the_same(tmp_path):
     raw = layer("segment", [], segmentId="3", name="Kitchen")
     raw["pixels"] = [n for y in range(10, 40) for x in range(10, 50) for n in (x, y)]
 
     assert home(tmp_path, KITCHEN) == home(tmp_path, raw)
 
 
-def test_overlapping_runs_count_once(tmp_path: Path) -> None:
+def test_overlapping_runs_count_once(tmp_path):
     plan = home(tmp_path, layer("floor", [*runs(10, 10, 30, 20), 15, 12, 5, 29, 19, 1, 3, 3, 0]))
 
     assert_box((0.5, -1.0, 1.5, -0.5), plan)
 
 
-def test_wall_removes_floor_with_a_note(tmp_path: Path) -> None:
+def test_wall_removes_floor_with_a_note(tmp_path):
     plan = home(tmp_path, KITCHEN, layer("wall", [*runs(20, 20, 22, 22), *runs(0, 0, 90, 5)]))
 
     assert pytest.approx((40 * 30 - 4) * PIXEL_AREA) == plan.area_m2
@@ -286,14 +280,14 @@ def test_wall_removes_floor_with_a_note(tmp_path: Path) -> None:
     assert "4 pixels are floor and wall: they count as wall" in plan.notes
 
 
-def test_pixels_that_share_a_corner_are_not_joined(tmp_path: Path) -> None:
+def test_pixels_that_share_a_corner_are_not_joined(tmp_path):
     plan = home(tmp_path, layer("floor", [*runs(10, 10, 20, 20), *runs(20, 20, 30, 30)]))
 
     assert 2 == len(plan.polygons)
     assert pytest.approx(200 * PIXEL_AREA) == plan.area_m2
 
 
-def test_room_inside_a_ring_of_wall_is_apart(tmp_path: Path) -> None:
+def test_room_inside_a_ring_of_wall_is_apart(tmp_path):
     """An outline in the hole of another one."""
     inner = runs(20, 20, 30, 30)
     outer = [*runs(10, 10, 40, 15), *runs(10, 35, 40, 40), *runs(10, 15, 15, 35)]
@@ -308,7 +302,7 @@ def test_room_inside_a_ring_of_wall_is_apart(tmp_path: Path) -> None:
 # --- Rooms --------------------------------------------------------------------------------------
 
 
-def test_segments_are_rooms_and_other_floor_is_unknown(tmp_path: Path) -> None:
+def test_segments_are_rooms_and_other_floor_is_unknown(tmp_path):
     plan = home(tmp_path)
 
     rooms = [(room.name, room.type, room.labels, room.cells) for room in plan.rooms]
@@ -319,7 +313,7 @@ def test_segments_are_rooms_and_other_floor_is_unknown(tmp_path: Path) -> None:
     ] == rooms
 
 
-def test_segments_of_one_name_get_names_of_their_own(tmp_path: Path) -> None:
+def test_segments_of_one_name_get_names_of_their_own(tmp_path):
     boxes = [runs(10 * k, 0, 10 * k + 10, 10) for k in range(1, 5)]
     names = ["Bedroom", "Bedroom", "Bedroom 2", "Bedroom"]
 
@@ -331,7 +325,7 @@ def test_segments_of_one_name_get_names_of_their_own(tmp_path: Path) -> None:
     assert any("several segments are called Bedroom" in note for note in plan.notes)
 
 
-def test_pixels_of_two_segments_belong_to_the_smaller(tmp_path: Path) -> None:
+def test_pixels_of_two_segments_belong_to_the_smaller(tmp_path):
     niche = layer("segment", runs(45, 10, 55, 20), segmentId="4", name="Niche")
 
     plan = home(tmp_path, KITCHEN, niche)
@@ -341,13 +335,13 @@ def test_pixels_of_two_segments_belong_to_the_smaller(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "   ", None, 7])
-def test_segment_without_a_proper_name_is_called_by_its_id(tmp_path: Path, name: object) -> None:
+def test_segment_without_a_proper_name_is_called_by_its_id(tmp_path, name):
     plan = home(tmp_path, layer("segment", runs(0, 0, 20, 20), segmentId="5", name=name))
 
     assert [("segment_5", "unknown")] == [(room.name, room.type) for room in plan.rooms]
 
 
-def test_umlaut_written_as_two_characters_is_the_same_name(tmp_path: Path) -> None:
+def test_umlaut_written_as_two_characters_is_the_same_name(tmp_path):
     plan = home(tmp_path, layer("segment", runs(0, 0, 20, 20), name="Ku\u0308che"))
 
     assert [("Küche", "kitchen")] == [(room.name, room.type) for room in plan.rooms]
@@ -360,7 +354,7 @@ def home_with_walls(folder: Path, *entities: dict[str, Any]) -> FloorPlan:
     return read_valetudo(write(folder, vacuum_map(KITCHEN, entities=list(entities))), no_go="wall")
 
 
-def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path: Path) -> None:
+def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path):
     entities = [
         entity("no_go_area", 101, 100, 114, 100, 114, 150, 101, 150),
         entity("virtual_wall", 50, 100, 250, 100),
@@ -374,7 +368,7 @@ def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path: Path) -> 
     assert plan == read_native(write(tmp_path, native_document(plan)))
 
 
-def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path: Path) -> None:
+def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path):
     """From 101 to 114 cm are the pixels 20 to 22, down to 150 cm the row 29."""
     area = entity("no_go_area", 101, 100, 114, 100, 114, 150, 101, 150)
 
@@ -386,7 +380,7 @@ def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("y", [100, 102])
-def test_virtual_wall_parts_a_room(tmp_path: Path, y: int) -> None:
+def test_virtual_wall_parts_a_room(tmp_path, y):
     wall = entity("virtual_wall", 50, y, 250, y + 31)
 
     plan = home_with_walls(tmp_path, wall)
@@ -395,7 +389,7 @@ def test_virtual_wall_parts_a_room(tmp_path: Path, y: int) -> None:
     assert plan.area_m2 > 1140 * PIXEL_AREA - 0.2
 
 
-def test_no_go_areas_can_be_ignored(tmp_path: Path) -> None:
+def test_no_go_areas_can_be_ignored(tmp_path):
     entities = [
         entity("no_go_area", 60, 60, 200, 60, 200, 150, 60, 150),
         entity("virtual_wall", 50, 100, 250, 100),
@@ -420,16 +414,14 @@ def test_no_go_areas_can_be_ignored(tmp_path: Path) -> None:
         entity("virtual_wall"),
     ],
 )
-def test_no_go_area_without_extent_is_ignored_with_a_note(
-    tmp_path: Path, bad: dict[str, Any]
-) -> None:
+def test_no_go_area_without_extent_is_ignored_with_a_note(tmp_path, bad):
     plan = home(tmp_path, KITCHEN, entities=[bad])
 
     assert 1200 == plan.rooms[0].cells
     assert [f"entities[0], {bad['type']}, has no extent: ignored"] == list(plan.notes)
 
 
-def test_no_go_area_beyond_the_floor_and_no_mop_area_change_nothing(tmp_path: Path) -> None:
+def test_no_go_area_beyond_the_floor_and_no_mop_area_change_nothing(tmp_path):
     far = entity("no_go_area", 9000, 9000, 9100, 9000, 9100, 9100)
     mop = entity("no_mop_area", 60, 60, 200, 60, 200, 150, 60, 150)
 
@@ -439,7 +431,7 @@ def test_no_go_area_beyond_the_floor_and_no_mop_area_change_nothing(tmp_path: Pa
     assert "also in the map, without effect on the plan: no_mop_area (1)" in plan.notes
 
 
-def test_no_go_area_over_everything_leaves_no_floor(tmp_path: Path) -> None:
+def test_no_go_area_over_everything_leaves_no_floor(tmp_path):
     area = entity("no_go_area", 0, 0, 900, 0, 900, 900, 0, 900)
 
     path = write(tmp_path, vacuum_map(entities=[area]))
@@ -452,7 +444,7 @@ def test_no_go_area_over_everything_leaves_no_floor(tmp_path: Path) -> None:
 # --- Path and charger -----------------------------------------------------------------------------
 
 
-def test_path_and_charger_are_in_the_frame_of_the_plan(tmp_path: Path) -> None:
+def test_path_and_charger_are_in_the_frame_of_the_plan(tmp_path):
     entities = [
         entity("path", 100, 100, 150, 100.5),
         entity("predicted_path", 1, 2, 3, 4),
@@ -473,9 +465,7 @@ def test_path_and_charger_are_in_the_frame_of_the_plan(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_real_charger_is_an_object_with_a_place_to_stand_in_front_of_it(
-    shared_data: Path, name: str
-) -> None:
+def test_real_charger_is_an_object_with_a_place_to_stand_in_front_of_it(shared_data, name):
     plan = read_valetudo(shared_data / "valetudo" / f"{name}.json")
 
     (charger,) = plan.objects
@@ -494,14 +484,14 @@ def test_real_charger_is_an_object_with_a_place_to_stand_in_front_of_it(
     )
 
 
-def test_charger_far_from_all_floor_has_no_place_to_stand(tmp_path: Path) -> None:
+def test_charger_far_from_all_floor_has_no_place_to_stand(tmp_path):
     plan = home(tmp_path, entities=[entity("charger_location", 5000, 5000)])
 
     assert [()] == [thing.uses for thing in plan.objects]
     assert plan == read_native(write(tmp_path, native_document(plan)))
 
 
-def test_map_without_path_and_charger_says_so(tmp_path: Path) -> None:
+def test_map_without_path_and_charger_says_so(tmp_path):
     path = write(tmp_path, vacuum_map())
 
     assert (0, 2) == read_valetudo_path(path).shape
@@ -512,7 +502,7 @@ def test_map_without_path_and_charger_says_so(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("points", [None, [1], [1, "2"], [1, True], [1, float("nan")], [1, 1e99]])
 @pytest.mark.parametrize("read", [read_valetudo_path, read_valetudo, read_valetudo_paths])
-def test_damaged_path_is_refused(tmp_path: Path, read: Any, points: object) -> None:
+def test_damaged_path_is_refused(tmp_path, read, points):
     bad = {"type": "path", "points": points}
     path = write(tmp_path, vacuum_map(entities=[bad]))
 
@@ -523,7 +513,7 @@ def test_damaged_path_is_refused(tmp_path: Path, read: Any, points: object) -> N
 # --- As a component, and found by its content -------------------------------------------------------
 
 
-def test_component_takes_the_cell_from_the_map(tmp_path: Path) -> None:
+def test_component_takes_the_cell_from_the_map(tmp_path):
     path = write(tmp_path, vacuum_map(pixelSize=4))
 
     source = Valetudo(path=path)
@@ -534,7 +524,7 @@ def test_component_takes_the_cell_from_the_map(tmp_path: Path) -> None:
     assert source.load() == load_floorplan(path)
 
 
-def test_cell_setting_is_used(tmp_path: Path) -> None:
+def test_cell_setting_is_used(tmp_path):
     path = write(tmp_path, vacuum_map())
 
     for plan in (Valetudo(path=path, cell=0.1).load(), load_floorplan(path, 0.1)):
@@ -542,12 +532,12 @@ def test_cell_setting_is_used(tmp_path: Path) -> None:
         assert pytest.approx(2000 * PIXEL_AREA) == plan.area_m2
 
 
-def test_component_refuses_an_unknown_choice(tmp_path: Path) -> None:
+def test_component_refuses_an_unknown_choice(tmp_path):
     with pytest.raises(ValidationError, match="keep_out"):
         Valetudo(path=write(tmp_path, vacuum_map()), no_go="maybe")
 
 
-def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path: Path) -> None:
+def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path):
     source = Valetudo(path=write(tmp_path, "{"))
 
     with pytest.raises(FloorPlanError, match="is not JSON"):
@@ -594,17 +584,17 @@ def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path: Path) -> No
         ({"entities": 5}, "entities is 5"),
     ],
 )
-def test_damaged_map_is_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+def test_damaged_map_is_refused(tmp_path, changes, message):
     assert message in refusal(tmp_path, vacuum_map(**changes))
 
 
-def test_noise_is_refused_quickly(tmp_path: Path) -> None:
+def test_noise_is_refused_quickly(tmp_path):
     chequered = [n for y in range(300) for x in range(y % 2, 300, 2) for n in (x, y, 1)]
 
     assert "noise" in refusal(tmp_path, vacuum_map(layer("floor", chequered)))
 
 
-def test_odd_layers_are_noted(tmp_path: Path) -> None:
+def test_odd_layers_are_noted(tmp_path):
     short = {**KITCHEN, "dimensions": {"pixelCount": 1300}}
     empty = layer("segment", [], segmentId="9")
 
@@ -618,15 +608,13 @@ def test_odd_layers_are_noted(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("box", [(-5, 0, 20, 20), (0, -1, 20, 20), (100, 0, 130, 9), (0, 9, 9, 90)])
-def test_pixels_beyond_the_stated_size_are_noted(
-    tmp_path: Path, box: tuple[int, int, int, int]
-) -> None:
+def test_pixels_beyond_the_stated_size_are_noted(tmp_path, box):
     plan = home(tmp_path, layer("floor", runs(*box)))
 
     assert any("reach beyond its size of 600 x 400 cm" in note for note in plan.notes)
 
 
-def test_map_without_a_stated_size_is_read(tmp_path: Path) -> None:
+def test_map_without_a_stated_size_is_read(tmp_path):
     assert () == home(tmp_path, KITCHEN, size=None).notes
 
 
@@ -649,7 +637,7 @@ def wall_with_gap(low: int, high: int) -> dict[str, Any]:
     return layer("wall", [*runs(40, 0, 42, low), *runs(40, high, 42, 30)])
 
 
-def test_unknown_pixels_at_a_threshold_are_bridged(tmp_path: Path) -> None:
+def test_unknown_pixels_at_a_threshold_are_bridged(tmp_path):
     plan = cleaned(tmp_path, LEFT, RIGHT, wall_with_gap(10, 28))
 
     assert 1 == len(plan.polygons)
@@ -659,7 +647,7 @@ def test_unknown_pixels_at_a_threshold_are_bridged(tmp_path: Path) -> None:
     assert 2 == len(cleaned(tmp_path, LEFT, RIGHT, wall_with_gap(10, 28), bridge_pixels=0).polygons)
 
 
-def test_wall_between_rooms_stays_unless_the_vacuum_drove_through(tmp_path: Path) -> None:
+def test_wall_between_rooms_stays_unless_the_vacuum_drove_through(tmp_path):
     wall = wall_with_gap(0, 0)
     path = entity("path", 100, 75, 300, 75)
 
@@ -670,7 +658,7 @@ def test_wall_between_rooms_stays_unless_the_vacuum_drove_through(tmp_path: Path
     assert 1 == len(driven.polygons)
 
 
-def test_scraps_of_floor_are_no_rooms(tmp_path: Path) -> None:
+def test_scraps_of_floor_are_no_rooms(tmp_path):
     plan = cleaned(tmp_path, LEFT, SCRAP)
     beside = cleaned(tmp_path, LEFT, layer("floor", runs(40, 0, 50, 10)))
     kept = cleaned(tmp_path, LEFT, SCRAP, scrap_area_m2=0)
@@ -683,7 +671,7 @@ def test_scraps_of_floor_are_no_rooms(tmp_path: Path) -> None:
     assert ["Kitchen", "unknown_1"] == [room.name for room in kept.rooms]
 
 
-def test_segment_without_a_name_that_is_a_scrap_belongs_to_its_neighbor(tmp_path: Path) -> None:
+def test_segment_without_a_name_that_is_a_scrap_belongs_to_its_neighbor(tmp_path):
     tiny = layer("segment", runs(40, 0, 50, 10), segmentId="9")
     named = layer("segment", runs(40, 0, 50, 10), segmentId="9", name="Pantry")
 
@@ -692,7 +680,7 @@ def test_segment_without_a_name_that_is_a_scrap_belongs_to_its_neighbor(tmp_path
     assert 1 == len(cleaned(tmp_path, tiny).rooms)  # the only one
 
 
-def test_narrow_border_of_segments_is_a_doorway(tmp_path: Path) -> None:
+def test_narrow_border_of_segments_is_a_doorway(tmp_path):
     rooms = [
         layer("segment", runs(0, 0, 40, 60), segmentId="1", name="Kitchen"),
         layer("segment", [*runs(40, 20, 90, 40)], segmentId="2", name="Hall"),
@@ -716,9 +704,7 @@ def test_narrow_border_of_segments_is_a_doorway(tmp_path: Path) -> None:
     ("name", "doorways"),
     [("S8_FW1286_with_obstacles", 5), ("converted_3790", 6), ("l10su_1121_carpet", 5)],
 )
-def test_captured_map_is_one_home_with_doorways_between_its_rooms(
-    shared_data: Path, name: str, doorways: int
-) -> None:
+def test_captured_map_is_one_home_with_doorways_between_its_rooms(shared_data, name, doorways):
     """Two of these maps had a doorway twice: on both sides of one wall."""
     path = shared_data / "captured" / "vacuum" / f"{name}.json"
     if not path.exists():
@@ -734,7 +720,7 @@ def test_captured_map_is_one_home_with_doorways_between_its_rooms(
     assert all(room.area_m2 >= 1 for room in plan.rooms)
 
 
-def test_format_version_1_is_read(tmp_path: Path) -> None:
+def test_format_version_1_is_read(tmp_path):
     pixels = [n for y in range(30) for x in range(40) for n in (x, y)]
     segment = {"type": "segment", "metaData": {"segmentId": 1, "name": "Kitchen"}, "pixels": pixels}
     old = vacuum_map(segment, metaData={"version": 1})

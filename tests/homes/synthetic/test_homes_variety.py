@@ -28,7 +28,7 @@ def room_graph(plan: FloorPlan) -> object:
 
 
 @pytest.mark.slow
-def test_small_flats_of_one_size_differ_in_rooms_and_links() -> None:
+def test_small_flats_of_one_size_differ_in_rooms_and_links():
     usual = {room_graph(home(seed, area_m2=50)) for seed in range(15)}
     varied = [home(seed, area_m2=50, variety=1) for seed in range(15)]
 
@@ -37,13 +37,13 @@ def test_small_flats_of_one_size_differ_in_rooms_and_links() -> None:
     assert all(40 <= plan.area_m2 <= 60 for plan in varied)
 
 
-def test_no_variety_is_the_same_home_as_without_the_key() -> None:
+def test_no_variety_is_the_same_home_as_without_the_key():
     assert Synthetic(seed=5, area_m2=50).load() == Synthetic(seed=5, area_m2=50, variety=0).load()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("area", [18, 22, 26, 29.9])
-def test_studios_are_one_room_to_live_and_sleep_in_and_a_bathroom(area: float) -> None:
+def test_studios_are_one_room_to_live_and_sleep_in_and_a_bathroom(area):
     kinds = set()
     for seed in range(6):
         plan = Synthetic(seed=seed, area_m2=area).load()
@@ -64,7 +64,7 @@ def test_studios_are_one_room_to_live_and_sleep_in_and_a_bathroom(area: float) -
     assert area < 24 or len(kinds) == 2
 
 
-def test_studio_with_a_bedroom_or_another_outline_is_refused() -> None:
+def test_studio_with_a_bedroom_or_another_outline_is_refused():
     with pytest.raises(FloorPlanError, match="20 m2 can't have 1 bedroom"):
         Synthetic(area_m2=20, bedrooms=1).load()
     with pytest.raises(FloorPlanError, match=r"another floorplan\.outline"):
@@ -73,7 +73,7 @@ def test_studio_with_a_bedroom_or_another_outline_is_refused() -> None:
         Synthetic(area_m2=17)
 
 
-def test_people_sleep_in_the_living_room_of_a_furnished_studio() -> None:
+def test_people_sleep_in_the_living_room_of_a_furnished_studio():
     run = fleet2d.run(
         {
             "floorplan": {"type": "synthetic", "area_m2": 20, "seed": 2, "furnish": True},
@@ -88,7 +88,7 @@ def test_people_sleep_in_the_living_room_of_a_furnished_studio() -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_home_is_whole_and_no_way_leads_through_a_private_room(seed: int) -> None:
+def test_home_is_whole_and_no_way_leads_through_a_private_room(seed):
     plan = home(seed)
     assert () == plan.notes
     assert 1 == Home(plan).space(0.25).parts
@@ -110,14 +110,14 @@ def test_home_is_whole_and_no_way_leads_through_a_private_room(seed: int) -> Non
 
 
 @pytest.mark.slow
-def test_large_homes_are_no_longer_than_28_m() -> None:
+def test_large_homes_are_no_longer_than_28_m():
     for seed in range(6):
         x0, y0, x1, y1 = home(seed, area_m2=250).bounds
         assert max(x1 - x0, y1 - y0) < 28
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_home_has_rooms_that_an_architect_would_draw(seed: int) -> None:
+def test_home_has_rooms_that_an_architect_would_draw(seed):
     plan = home(seed)
     kinds = [room.type for room in plan.rooms]
     ways = {"entryway", "hallway", "living_room", "dining_room", "kitchen"}
@@ -133,7 +133,7 @@ def test_home_has_rooms_that_an_architect_would_draw(seed: int) -> None:
     assert all(3 <= area <= 9 for area in baths)
 
 
-def test_rooms_are_not_all_rectangles_and_many_homes_have_no_corridor() -> None:
+def test_rooms_are_not_all_rectangles_and_many_homes_have_no_corridor():
     plans = [home(seed) for seed in SEEDS]
     shares = [room.area_m2 / area_of(room.bounds) for plan in plans for room in plan.rooms]
     without = [plan for plan in plans if not plan.rooms_of_type("hallway")]

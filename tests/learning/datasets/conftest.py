@@ -3,10 +3,8 @@
 import pytest
 from tests.learning.datasets.small import made
 
-from fleet2d.learning.datasets.reader import Dataset
-
 
 @pytest.fixture(scope="session")
-def data() -> Dataset:
+def data():
     """A small data set, made once."""
     return made()

@@ -30,7 +30,7 @@ def records(data: Dataset) -> dict[str, str]:
 
 
 @pytest.mark.slow
-def test_tables_are_there_for_every_split(data: Dataset) -> None:
+def test_tables_are_there_for_every_split(data):
     assert ("train", "test") == data.splits
     runs = data.arrow("runs", "train").to_pydict()
     assert [0, 1, 2] == runs["run"]
@@ -41,7 +41,7 @@ def test_tables_are_there_for_every_split(data: Dataset) -> None:
     assert {"routine", "last_seen"} == set(data.arrow("beliefs", "test")["model"].to_pylist())
 
 
-def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
+def test_labels_are_the_truth_of_their_step(data):
     labels = data.polars("labels", "test").collect()
     places, following = labels["place"].to_list(), labels["next_place"].to_list()
     steps, next_steps = labels["step"].to_list(), labels["next_step"].to_list()
@@ -55,7 +55,7 @@ def test_labels_are_the_truth_of_their_step(data: Dataset) -> None:
 
 
 @pytest.mark.slow
-def test_moments_of_the_doubled_hour_are_told_apart_by_their_offset(tmp_path: Path) -> None:
+def test_moments_of_the_doubled_hour_are_told_apart_by_their_offset(tmp_path):
     """The hour from two to three came twice, and one couldn't tell which of them a label meant."""
     autumn = {
         "start": "2026-10-25T00:00",
@@ -74,7 +74,7 @@ def test_moments_of_the_doubled_hour_are_told_apart_by_their_offset(tmp_path: Pa
     assert moments["utc_offset_min"].unique().sort().to_list() == [60, 120]
 
 
-def test_a_home_without_a_time_zone_has_no_offset(data: Dataset) -> None:
+def test_a_home_without_a_time_zone_has_no_offset(data):
     for table in ("evidence", "labels", "beliefs"):
         offsets = data.polars(table, "train").select("utc_offset_min").collect()
         assert offsets["utc_offset_min"].is_null().all()
@@ -82,14 +82,12 @@ def test_a_home_without_a_time_zone_has_no_offset(data: Dataset) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [2, 4])
-def test_the_content_is_the_same_for_any_number_of_workers(
-    data: Dataset, tmp_path: Path, workers: int
-) -> None:
+def test_the_content_is_the_same_for_any_number_of_workers(data, tmp_path, workers):
     assert records(data) == records(make(tmp_path / "again", workers))
 
 
 @pytest.mark.slow
-def test_an_interrupted_data_set_goes_on(data: Dataset, tmp_path: Path) -> None:
+def test_an_interrupted_data_set_goes_on(data, tmp_path):
     out = tmp_path / "killed"
     source = tmp_path / "small.json"
     source.write_text(json.dumps(SOURCE))
@@ -115,9 +113,7 @@ def test_an_interrupted_data_set_goes_on(data: Dataset, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
-    data: Dataset, tmp_path: Path
-) -> None:
+def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(data, tmp_path):
     out, parts = tmp_path / "damaged", tmp_path / "damaged" / "unfinished"
     shutil.copytree(data.root, out)
     (out / "dataset.json").unlink()
@@ -143,7 +139,7 @@ def test_damaged_parts_and_records_of_an_unfinished_one_are_made_again(
 
 
 @pytest.mark.slow
-def test_one_killed_before_it_noted_its_unfit_runs_goes_on(data: Dataset, tmp_path: Path) -> None:
+def test_one_killed_before_it_noted_its_unfit_runs_goes_on(data, tmp_path):
     """The plan is written first: a kill after it left a folder that couldn't be gone on with."""
     parts = tmp_path / "killed" / "unfinished"
     parts.mkdir(parents=True)
@@ -165,9 +161,7 @@ def unfit(folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_all_that_is_unfit_is_told_before_the_first_run_and_the_corrected_file_goes_on(
-    tmp_path: Path,
-) -> None:
+def test_all_that_is_unfit_is_told_before_the_first_run_and_the_corrected_file_goes_on(tmp_path):
     with pytest.raises(ScenarioError) as caught:
         fleet2d.dataset(unfit(tmp_path), tmp_path / "made", workers=1)
 
@@ -178,7 +172,7 @@ def test_all_that_is_unfit_is_told_before_the_first_run_and_the_corrected_file_g
 
 
 @pytest.mark.slow
-def test_unfit_runs_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_unfit_runs_are_left_out_and_counted(tmp_path):
     data = fleet2d.dataset({**unfit(tmp_path), "skip": "unfit"}, tmp_path / "made", workers=1)
 
     left_out = {int(number) for number in data.manifest.unfit}
@@ -188,13 +182,13 @@ def test_unfit_runs_are_left_out_and_counted(tmp_path: Path) -> None:
     assert "Left out: train, home" in (data.root / "README.md").read_text()
 
 
-def test_a_complete_one_is_opened_and_another_refused(data: Dataset) -> None:
+def test_a_complete_one_is_opened_and_another_refused(data):
     assert records(make(data.root)) == records(data)
     with pytest.raises(InputError, match="holds another data set"):
         fleet2d.dataset({**SOURCE, "seed": 5}, data.root)
 
 
-def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_refused(tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
     with pytest.raises(InputError, match="not empty"):
         make(tmp_path)
@@ -202,7 +196,7 @@ def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "gone"])
-def test_damaged_shards_are_found(data: Dataset, tmp_path: Path, damage: str) -> None:
+def test_damaged_shards_are_found(data, tmp_path, damage):
     root = tmp_path / "copy"
     shutil.copytree(data.root, root)
     path = root / "train" / "labels-00001.parquet"
@@ -222,7 +216,7 @@ def test_damaged_shards_are_found(data: Dataset, tmp_path: Path, damage: str) ->
 
 
 @pytest.mark.slow
-def test_a_deleted_file_is_made_again_with_its_shard_only(data: Dataset, tmp_path: Path) -> None:
+def test_a_deleted_file_is_made_again_with_its_shard_only(data, tmp_path):
     root = tmp_path / "copy"
     shutil.copytree(data.root, root)
     (root / "train" / "labels-00001.parquet").unlink()
@@ -234,7 +228,7 @@ def test_a_deleted_file_is_made_again_with_its_shard_only(data: Dataset, tmp_pat
     assert not (root / "unfinished").exists()
 
 
-def test_a_deleted_file_of_another_version_is_not_made_again(data: Dataset, tmp_path: Path) -> None:
+def test_a_deleted_file_of_another_version_is_not_made_again(data, tmp_path):
     root = tmp_path / "copy"
     shutil.copytree(data.root, root)
     manifest = json.loads((root / "dataset.json").read_text())
@@ -249,9 +243,7 @@ def test_a_deleted_file_of_another_version_is_not_made_again(data: Dataset, tmp_
 
 
 @pytest.mark.slow
-def test_a_file_that_can_not_be_made_again_as_it_was_is_refused(
-    data: Dataset, tmp_path: Path
-) -> None:
+def test_a_file_that_can_not_be_made_again_as_it_was_is_refused(data, tmp_path):
     root = tmp_path / "copy"
     shutil.copytree(data.root, root)
     manifest = json.loads((root / "dataset.json").read_text())
@@ -263,7 +255,7 @@ def test_a_file_that_can_not_be_made_again_as_it_was_is_refused(
         make(root)
 
 
-def test_a_day_takes_little_room(data: Dataset) -> None:
+def test_a_day_takes_little_room(data):
     """Bytes of evidence and labels for a day of one person, beside the fixed part of each file."""
     table = data.arrow("labels", "train")
     assert table.nbytes > 0
@@ -276,7 +268,7 @@ def test_a_day_takes_little_room(data: Dataset) -> None:
     assert size / days < 32_000
 
 
-def test_the_card_says_what_is_in_it(data: Dataset) -> None:
+def test_the_card_says_what_is_in_it(data):
     card = (data.root / "README.md").read_text()
 
     assert card.startswith("---\nlicense: cc0-1.0\n")
@@ -285,14 +277,14 @@ def test_the_card_says_what_is_in_it(data: Dataset) -> None:
     assert (data.root / "pictures" / "place.png").stat().st_size > 1000
 
 
-def test_numbers_of_rooms_are_written_below_their_bars() -> None:
+def test_numbers_of_rooms_are_written_below_their_bars():
     figure = Figure()
     _bars(figure, {"train": {"rooms in a home": Counter({"5": 1, "14": 2})}}, "rooms in a home")
     axes = figure.axes[0]
     assert [label.get_ha() for label in axes.get_xticklabels()] == ["center", "center"]
 
 
-def test_workers_share_the_shards(data: Dataset) -> None:
+def test_workers_share_the_shards(data):
     whole, *shared = (
         [part.truth.tolist() for part in windows(data, "train", worker, workers)]
         for worker, workers in ((0, 1), (0, 2), (1, 2), (5, 6))
@@ -302,7 +294,7 @@ def test_workers_share_the_shards(data: Dataset) -> None:
     assert all(shared[:2])
 
 
-def test_duckdb_and_polars_read_it(data: Dataset) -> None:
+def test_duckdb_and_polars_read_it(data):
     duckdb = pytest.importorskip("duckdb")
     pattern = str(data.root / "train" / "labels-*.parquet")
 
@@ -312,13 +304,13 @@ def test_duckdb_and_polars_read_it(data: Dataset) -> None:
 
 
 @pytest.mark.parametrize(("table", "split"), [("label", "train"), ("labels", "tests")])
-def test_unknown_tables_and_splits_are_named(data: Dataset, table: str, split: str) -> None:
+def test_unknown_tables_and_splits_are_named(data, table, split):
     with pytest.raises(InputError, match="tables beliefs, evidence, labels, rooms, runs"):
         data.arrow(table, split)
 
 
 @pytest.mark.slow
-def test_a_failed_run_keeps_the_others(tmp_path: Path) -> None:
+def test_a_failed_run_keeps_the_others(tmp_path):
     """A household that can't live in a home: the message names the scenario, and nothing is lost."""
     bad: dict[str, Any] = json.loads(json.dumps(SOURCE))
     bad["vary"] = {
@@ -332,6 +324,6 @@ def test_a_failed_run_keeps_the_others(tmp_path: Path) -> None:
         fleet2d.open_dataset(tmp_path / "bad")
 
 
-def test_steps_of_evidence_are_the_last_of_their_bins(data: Dataset) -> None:
+def test_steps_of_evidence_are_the_last_of_their_bins(data):
     steps = np.array(data.arrow("evidence", "train")["step"].to_pylist())
     assert set((steps + 1) % 60) == {0}

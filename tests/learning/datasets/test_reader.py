@@ -26,7 +26,7 @@ def written(path: Path, name: str, **changes: Any) -> Path:
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_a_table_of_other_columns_is_refused(tmp_path: Path, name: str) -> None:
+def test_a_table_of_other_columns_is_refused(tmp_path, name):
     path = written(tmp_path / "table.parquet", name)
     other = pq.read_table(path).append_column("more", pa.array([1]))
     pq.write_table(other, path)
@@ -48,9 +48,7 @@ def wrong_values() -> Iterator[tuple[str, str, float | None]]:
 
 
 @pytest.mark.parametrize(("name", "column", "value"), list(wrong_values()))
-def test_a_value_that_no_data_set_has_is_refused(
-    tmp_path: Path, name: str, column: str, value: float | None
-) -> None:
+def test_a_value_that_no_data_set_has_is_refused(tmp_path, name, column, value):
     path = written(tmp_path / "table.parquet", name, **{column: value})
     with pytest.raises(InputError, match=column):
         reader._read(path, name)

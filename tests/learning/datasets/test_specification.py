@@ -21,7 +21,7 @@ def file(**splits: Any) -> dict[str, Any]:
     return {"base": BASE, "splits": splits}
 
 
-def test_every_run_has_its_own_seed_and_home_in_turn() -> None:
+def test_every_run_has_its_own_seed_and_home_in_turn():
     plan = plan_dataset(
         file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
     )
@@ -38,7 +38,7 @@ def plan_source(plan: Any) -> dict[str, Any]:
     return file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
 
 
-def test_a_file_that_changes_makes_another_data_set(tmp_path: Path) -> None:
+def test_a_file_that_changes_makes_another_data_set(tmp_path):
     """The runs of a table, a persona or a floor plan that changed since were mixed with earlier ones."""
     persona = tmp_path / "mine.yaml"
     persona.write_text(
@@ -57,7 +57,7 @@ def test_a_file_that_changes_makes_another_data_set(tmp_path: Path) -> None:
     assert 3 == len({*digests})
 
 
-def test_another_seed_draws_other_runs() -> None:
+def test_another_seed_draws_other_runs():
     source = file(train=split(3, 0, ["retired"], ["student"]))
 
     one, other = plan_dataset(source), plan_dataset({**source, "seed": 1})
@@ -75,9 +75,7 @@ def test_another_seed_draws_other_runs() -> None:
         (split(1, 9, ["mine.yaml"]), r"share 1 persona\(s\): retired"),
     ],
 )
-def test_splits_that_overlap_name_what_they_share(
-    test: dict[str, Any], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_splits_that_overlap_name_what_they_share(test, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("mine.yaml").write_text("extends: [retired]\n")
     with pytest.raises(InputError, match=words):
@@ -85,12 +83,12 @@ def test_splits_that_overlap_name_what_they_share(
 
 
 @pytest.mark.parametrize("name", ["../train", "", "a b", "unfinished", "pictures"])
-def test_a_split_is_named_as_its_folder_may_be(name: str) -> None:
+def test_a_split_is_named_as_its_folder_may_be(name):
     with pytest.raises(InputError, match="can't be the name of a split"):
         plan_dataset(file(**{name: split(1, 0, ["retired"])}))
 
 
-def test_a_home_is_the_same_by_any_name() -> None:
+def test_a_home_is_the_same_by_any_name():
     train, test = split(1, 0, ["retired"]), split(1, 0, ["child"])
     test["homes"] = [{"values": [0], "key": "floorplan.seed"}]
 
@@ -98,7 +96,7 @@ def test_a_home_is_the_same_by_any_name() -> None:
         plan_dataset(file(train=train, test={**test, "homes": train["homes"]}))
 
 
-def test_axes_vary_each_run() -> None:
+def test_axes_vary_each_run():
     robot = {"options": {"slow": {"robots.astro.speed": 0.3}, "fast": {"robots.astro.speed": 0.8}}}
 
     plan = plan_dataset({**file(train=split(20, 0, ["retired"])), "vary": {"robot": robot}})
@@ -138,12 +136,12 @@ def test_axes_vary_each_run() -> None:
         ({"vary": {"robot": {"options": {"none": {"robots.astra.speed": 1}}}}}, "astra"),
     ],
 )
-def test_mistakes_are_named_before_the_first_run(change: dict[str, Any], words: str) -> None:
+def test_mistakes_are_named_before_the_first_run(change, words):
     with pytest.raises(InputError, match=words):
         plan_dataset({**file(train=split(1, 0, ["retired"])), **change})
 
 
-def test_a_million_runs_are_planned_without_being_drawn() -> None:
+def test_a_million_runs_are_planned_without_being_drawn():
     plan = plan_dataset(file(train=split(1_000_000, 0, ["retired"])))
 
     assert 62_500 == sum(1 for _ in plan.shards())

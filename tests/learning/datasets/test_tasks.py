@@ -1,7 +1,5 @@
 """Scores of tasks: differences by home, in which each home counts alike."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -20,7 +18,7 @@ from fleet2d.learning.datasets.tasks import (
 ENDS = ("", LOWER_END, UPPER_END)
 
 
-def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
+def test_the_difference_to_routine_is_a_mean_over_homes():
     """Two homes with one and three windows, and a model that is better by a factor of 2 or 4."""
     prior = np.array([[0.2, 0.8], [0.4, 0.6], [0.4, 0.6], [0.4, 0.6]])
     model = np.array([[0.8, 0.2], [0.8, 0.2], [0.8, 0.2], [0.8, 0.2]])
@@ -46,9 +44,7 @@ def test_the_difference_to_routine_is_a_mean_over_homes() -> None:
     assert {"log_loss - routine"} == {name[:18] for name in _difference(one, "mine")}
 
 
-def test_the_table_has_a_column_for_each_model_and_intervals_in_its_cells(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_table_has_a_column_for_each_model_and_intervals_in_its_cells(capsys):
     scores = {"log_loss": 0.5, "gain": -1.0, "gain lower end": -2.0, "gain upper end": 0.0}
     entries = [LeaderboardEntry("rtp", "routine", scores, 7)]
     entries.append(LeaderboardEntry("rtp", "learned", {"log_loss": 0.25, "gain": -3.0}, 7))
@@ -65,7 +61,7 @@ def test_the_table_has_a_column_for_each_model_and_intervals_in_its_cells(
 
 
 @pytest.mark.slow
-def test_tuned_networks_are_scored_on_the_days_after_those_that_tuned_them(tmp_path: Path) -> None:
+def test_tuned_networks_are_scored_on_the_days_after_those_that_tuned_them(tmp_path):
     people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
     base = {"extends": "bundled:paper", "simulation": {"duration": "2 d"}}
     source = {"base": base, "splits": {"test": people}, "beliefs": ["routine"], "every": "1 h"}
@@ -83,7 +79,7 @@ def test_tuned_networks_are_scored_on_the_days_after_those_that_tuned_them(tmp_p
 
 
 @pytest.mark.slow
-def test_moments_at_which_nobody_knows_where_a_person_is_have_no_label(tmp_path: Path) -> None:
+def test_moments_at_which_nobody_knows_where_a_person_is_have_no_label(tmp_path):
     """The log is silent between two rooms for an hour, which a stay in one room isn't."""
     log = tmp_path / "home_Sensors.txt"
     lines = (
@@ -104,7 +100,7 @@ def test_moments_at_which_nobody_knows_where_a_person_is_have_no_label(tmp_path:
 
 
 @pytest.mark.slow
-def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path: Path) -> None:
+def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path):
     people = {"train": ["retired"], "test": ["student"], "nobody": []}
     splits = {
         name: {"runs": 1, "homes": [{"synthetic": 1, "first": k}], "households": [household]}
@@ -123,7 +119,7 @@ def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path:
 
 
 @pytest.mark.slow
-def test_beliefs_without_a_label_of_their_time_are_not_scored(tmp_path: Path) -> None:
+def test_beliefs_without_a_label_of_their_time_are_not_scored(tmp_path):
     people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
     base = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
     source = {"base": base, "labels": "1 h", "splits": {"test": people}, "beliefs": ["routine"]}

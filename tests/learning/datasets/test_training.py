@@ -1,13 +1,11 @@
 """Training: right gradients, the same weights again, and fewer losses than before."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from tests.learning.datasets.small import SOURCE
-from tests.scenes import Cli
 
 from fleet2d.algorithms.presence.learned import (
     GAP,
@@ -19,7 +17,6 @@ from fleet2d.algorithms.presence.learned import (
 from fleet2d.errors import InputError
 from fleet2d.kernels import TRACE_FEATURES
 from fleet2d.learning.datasets import training
-from fleet2d.learning.datasets.reader import Dataset
 from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, predict, train
 from fleet2d.learning.datasets.windows import Windows
 
@@ -43,7 +40,7 @@ def loss(weights: Weights, windows: Windows) -> float:
     return float(-np.log(np.maximum(belief, 1e-6)).mean())
 
 
-def test_gradients_equal_differences() -> None:
+def test_gradients_equal_differences():
     random = np.random.default_rng(1)
     [batch] = training._batches([random_windows(1, count=7)], 7)
     batch = training.WindowBatch(*(np.asarray(part, float) for part in batch[:2]), *batch[2:])
@@ -61,7 +58,7 @@ def test_gradients_equal_differences() -> None:
             assert gradient[name][at] == pytest.approx((near[1] - near[0]) / 2e-6, abs=1e-5)
 
 
-def test_what_can_be_learned_is_learned() -> None:
+def test_what_can_be_learned_is_learned():
     seen, unseen = random_windows(1), random_windows(2)
     settings = TrainingSettings(hidden=8, epochs=30, batch=64, trust=(1.0,) * TRUSTS)
 
@@ -70,21 +67,21 @@ def test_what_can_be_learned_is_learned() -> None:
     assert loss(weights, unseen) < 0.6 * np.log(4)
 
 
-def test_the_same_seed_gives_the_same_weights() -> None:
+def test_the_same_seed_gives_the_same_weights():
     settings = TrainingSettings(hidden=4, epochs=2)
     one, other = (train([random_windows(1)], settings=settings) for _ in range(2))
 
     assert np.array_equal(one.network.first, other.network.first)
 
 
-def test_untrained_weights_leave_the_belief_as_it_is() -> None:
+def test_untrained_weights_leave_the_belief_as_it_is():
     windows = random_windows(1)
     weights = train([windows], settings=TrainingSettings(epochs=1, rate=0.0))
 
     assert np.abs(predict(weights, windows) - windows.beliefs["routine"]).max() < 1e-6
 
 
-def test_fine_tuning_helps_and_stays_near() -> None:
+def test_fine_tuning_helps_and_stays_near():
     start = train([random_windows(1)], settings=TrainingSettings(hidden=8, epochs=10, batch=64))
     home = random_windows(5)
 
@@ -95,7 +92,7 @@ def test_fine_tuning_helps_and_stays_near() -> None:
     assert change < 0.1 * np.abs(start.network.second).mean()
 
 
-def test_the_correction_counts_by_the_gap_as_far_as_it_is_trusted() -> None:
+def test_the_correction_counts_by_the_gap_as_far_as_it_is_trusted():
     """Trusted for short gaps only: longer ones keep the belief that is corrected."""
     windows = random_windows(1)
     windows.features[:, :, GAP] = np.where(np.arange(300) < 150, 0.0, 6.0)[:, None]
@@ -108,14 +105,12 @@ def test_the_correction_counts_by_the_gap_as_far_as_it_is_trusted() -> None:
     assert change[150:].max() < 1e-6
 
 
-def test_nothing_to_train_on_is_an_error() -> None:
+def test_nothing_to_train_on_is_an_error():
     with pytest.raises(InputError, match="no windows"):
         train([])
 
 
-def test_a_data_set_trains_weights_that_a_run_uses(
-    tmp_path: Path, data: Dataset, fleet2d: Cli
-) -> None:
+def test_a_data_set_trains_weights_that_a_run_uses(tmp_path, data, fleet2d):
     folder = str(data.root)
     own, tuned = tmp_path / "own.npz", tmp_path / "tuned.npz"
 
@@ -137,8 +132,8 @@ def test_a_data_set_trains_weights_that_a_run_uses(
 
 
 def test_the_file_of_a_data_set_is_made_and_the_weights_compared_with_the_shipped(
-    tmp_path: Path, data: Dataset, fleet2d: Cli
-) -> None:
+    tmp_path, data, fleet2d
+):
     """The data set is there already, beside the weights, so it is opened."""
     (tmp_path / "small.yaml").write_text(yaml.safe_dump(SOURCE))
     shutil.copytree(data.root, tmp_path / "learned_data")
@@ -152,9 +147,7 @@ def test_the_file_of_a_data_set_is_made_and_the_weights_compared_with_the_shippe
     assert ["routine", "last_seen", "learned", "learned.npz"] == heads.split()
 
 
-def test_weights_that_could_not_be_written_are_refused_before_training(
-    data: Dataset, tmp_path: Path, fleet2d: Cli
-) -> None:
+def test_weights_that_could_not_be_written_are_refused_before_training(data, tmp_path, fleet2d):
     code, _, err = fleet2d(
         "dataset", "train", "--on", str(data.root), "--out", str(tmp_path / "x/own.npz")
     )

@@ -8,13 +8,12 @@ import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.learning.datasets.reader import Dataset
 from fleet2d.learning.datasets.tables import SCHEMAS
 from fleet2d.learning.datasets.windows import Windows, windows_of, windows_of_run
 
 
 @pytest.fixture
-def tables(data: Dataset) -> dict[str, Any]:
+def tables(data):
     return {name: data.arrow(name, "train") for name in SCHEMAS}
 
 
@@ -30,7 +29,7 @@ def changed(table: pa.Table, column: str, which: Any, value: Any) -> pa.Table:
     return table.set_column(at, column, pa.array(values, table.schema.field(column).type))
 
 
-def test_there_is_a_window_for_each_belief_of_each_user(tables: dict[str, Any]) -> None:
+def test_there_is_a_window_for_each_belief_of_each_user(tables):
     parts = features(tables)
     users = [name for names in tables["runs"]["users"].to_pylist() for name in names]
 
@@ -44,7 +43,7 @@ def test_there_is_a_window_for_each_belief_of_each_user(tables: dict[str, Any]) 
 
 
 @pytest.mark.parametrize("last", [8, 19, 25, 38])
-def test_evidence_after_a_window_changes_nothing_in_it(tables: dict[str, Any], last: int) -> None:
+def test_evidence_after_a_window_changes_nothing_in_it(tables, last):
     """Every column of evidence is changed from the step after a window on; features until then are
     the same.
     """
@@ -64,7 +63,7 @@ def test_evidence_after_a_window_changes_nothing_in_it(tables: dict[str, Any], l
         assert not np.array_equal(one.features, other.features)
 
 
-def test_beliefs_after_a_moment_change_nothing_before(tables: dict[str, Any]) -> None:
+def test_beliefs_after_a_moment_change_nothing_before(tables):
     late = tables["beliefs"]["step"].to_numpy() >= 3 * 3600
     beliefs = changed(tables["beliefs"], "probability", late, 0.01)
 
@@ -73,7 +72,7 @@ def test_beliefs_after_a_moment_change_nothing_before(tables: dict[str, Any]) ->
         assert np.array_equal(one.features[early], other.features[early])
 
 
-def test_the_truth_is_in_no_feature(tables: dict[str, Any]) -> None:
+def test_the_truth_is_in_no_feature(tables):
     """Labels, which nobody perceives, are all changed: features are the same, the truth isn't."""
     everywhere = np.ones(len(tables["labels"]), bool)
     labels = changed(tables["labels"], "place", everywhere, "away")
@@ -85,7 +84,7 @@ def test_the_truth_is_in_no_feature(tables: dict[str, Any]) -> None:
     assert any((part.truth < len(part.places) - 1).any() for part in features(tables))
 
 
-def test_windows_equal_those_of_the_model_in_the_loop() -> None:
+def test_windows_equal_those_of_the_model_in_the_loop():
     """The features of a data set and those that the model computes as the run goes are the same."""
     from fleet2d.algorithms.presence.learned import shipped_weights
     from fleet2d.learning.datasets.training import predict
@@ -116,12 +115,12 @@ def test_windows_equal_those_of_the_model_in_the_loop() -> None:
     assert np.abs(predict(shipped_weights(), part) - in_the_loop).max() < 1e-4
 
 
-def test_a_run_without_the_tables_says_what_to_add() -> None:
+def test_a_run_without_the_tables_says_what_to_add():
     run = fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=1)
     with pytest.raises(InputError, match="type: evidence_table"):
         windows_of_run(run)
 
 
-def test_a_data_set_without_beliefs_of_routine_says_so(tables: dict[str, Any]) -> None:
+def test_a_data_set_without_beliefs_of_routine_says_so(tables):
     with pytest.raises(InputError, match="beliefs of routine"):
         features({**tables, "beliefs": SCHEMAS["beliefs"].empty_table()})

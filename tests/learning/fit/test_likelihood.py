@@ -15,7 +15,7 @@ from fleet2d.learning.fit.likelihood import (
 )
 
 
-def test_derivatives_of_the_factors_are_those_of_finite_differences() -> None:
+def test_derivatives_of_the_factors_are_those_of_finite_differences():
     x = np.linspace(0, 7, 50)
     for factor, theta in (
         (Constant("top", 50), [1.3]),
@@ -31,7 +31,7 @@ def test_derivatives_of_the_factors_are_those_of_finite_differences() -> None:
             assert rise == pytest.approx(slopes[:, i], abs=1e-6)
 
 
-def test_the_fit_is_a_maximum() -> None:
+def test_the_fit_is_a_maximum():
     log = simulated(1, 3000)
     likelihood = ProductLikelihood(
         [Constant("top", 3000), Falling("distance", log.distance)], log.detected
@@ -43,7 +43,7 @@ def test_the_fit_is_a_maximum() -> None:
         assert likelihood._value(likelihood._model(theta)[0]) <= best.log_likelihood
 
 
-def test_the_fit_of_a_constant_is_the_share() -> None:
+def test_the_fit_of_a_constant_is_the_share():
     outcomes = np.arange(100) < 37
     likelihood = ProductLikelihood([Constant("top", 100)], outcomes)
     best = likelihood.fit()
@@ -57,7 +57,7 @@ def test_the_fit_of_a_constant_is_the_share() -> None:
 
 
 @pytest.mark.slow
-def test_large_logs_give_the_true_parameters() -> None:
+def test_large_logs_give_the_true_parameters():
     log = simulated(3, 80_000, bearing=True, turned=True)
     assert log.bearing is not None
     assert log.orientation is not None
@@ -81,9 +81,7 @@ def test_large_logs_give_the_true_parameters() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("rows", "repeats", "most"), some([(600, 50, 8), (600, 250, 25)], 2))
-def test_intervals_cover_the_truth_as_often_as_they_claim(
-    rows: int, repeats: int, most: int
-) -> None:
+def test_intervals_cover_the_truth_as_often_as_they_claim(rows, repeats, most):
     """Of 50 logs, 95 % intervals miss the truth in 2.5 +- 1.5; 3.7 deviations are allowed."""
     missed = dict.fromkeys(("top", "distance midpoint", "distance width"), 0)
     for seed in range(repeats):
@@ -118,7 +116,7 @@ class Known:
 
 
 @pytest.mark.slow
-def test_intervals_of_bearing_and_orientation_cover_the_truth_as_often_as_they_claim() -> None:
+def test_intervals_of_bearing_and_orientation_cover_the_truth_as_often_as_they_claim():
     """Of 30 logs, 95 % intervals miss in 1.5 +- 1.2; none of 4 parameters may miss in more than 5."""
     names = ("bearing midpoint", "bearing width", "side", "back")
     missed = dict.fromkeys(names, 0)
@@ -138,7 +136,7 @@ def test_intervals_of_bearing_and_orientation_cover_the_truth_as_often_as_they_c
     assert sum(missed.values()) >= 2, missed
 
 
-def test_an_interval_that_the_log_does_not_bound_is_open() -> None:
+def test_an_interval_that_the_log_does_not_bound_is_open():
     rng = np.random.default_rng(5)
     outcomes = rng.random(300) < 0.999999
     likelihood = ProductLikelihood([Constant("top", 300)], outcomes)
@@ -147,7 +145,7 @@ def test_an_interval_that_the_log_does_not_bound_is_open() -> None:
     assert 0.98 < (top.low or 0) < 0.995  # 300 of 300: exp(-1.92 / 300)
 
 
-def test_wilson_intervals_stay_within_0_and_1() -> None:
+def test_wilson_intervals_stay_within_0_and_1():
     none, every = wilson(0, 20), wilson(20, 20)
     assert (0.0, 1.0) == (none.low, every.high)
     assert none.high == pytest.approx(1 - (every.low or 0))

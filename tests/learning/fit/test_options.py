@@ -13,7 +13,7 @@ from fleet2d.logs.log import ActivityLog, LogError
 
 
 @pytest.fixture(autouse=True)
-def _few_days_are_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
+def _few_days_are_sampled(monkeypatch):
     """How well days fit, which takes long to tell, is no matter here."""
     for name in ("SAMPLED", "CHAIN_DAYS", "SAMPLED_BY_SECOND", "CHAIN_DAYS_BY_SECOND"):
         monkeypatch.setattr(validation, name, 7)
@@ -36,20 +36,20 @@ def events(path: Path) -> ActivityLog:
     return log
 
 
-def test_labels_are_given_kinds_of_rooms(tmp_path: Path) -> None:
+def test_labels_are_given_kinds_of_rooms(tmp_path):
     log = events(tmp_path)
     timeline = read_timeline(log, {"M003": "bedroom", "M018": "kitchen"})
     assert timeline.places == ("bedroom", "kitchen")
     assert {"sleeping", "meal_preparation"} == {state.activity for state in timeline.states}
 
 
-def test_a_label_without_a_kind_is_left_out(tmp_path: Path) -> None:
+def test_a_label_without_a_kind_is_left_out(tmp_path):
     log = events(tmp_path)
     assert kinds_of(log, {"M018": ""}) == {"M003": ("m003",), "M018": None}
     assert read_timeline(log, {"M018": ""}).places == ("m003",)
 
 
-def test_a_shorter_gap_leaves_more_unknown(tmp_path: Path) -> None:
+def test_a_shorter_gap_leaves_more_unknown(tmp_path):
     from datetime import timedelta
 
     log = events(tmp_path)
@@ -60,14 +60,14 @@ def test_a_shorter_gap_leaves_more_unknown(tmp_path: Path) -> None:
     assert known[0] > known[1]
 
 
-def test_what_one_sensor_can_not_tell_is_said(tmp_path: Path) -> None:
+def test_what_one_sensor_can_not_tell_is_said(tmp_path):
     lines = events(tmp_path).path.read_text().replace("M018", "M003").splitlines()
     (tmp_path / "one").write_text("\n".join(lines) + "\n")
     lines = fit_routine(tmp_path / "one", tmp_path / "persona.yaml")
     assert any("in one room, m003: changes of room, stays and absences can't" in x for x in lines)
 
 
-def test_a_week_without_the_person_is_left_out_with_the_reason(tmp_path: Path) -> None:
+def test_a_week_without_the_person_is_left_out_with_the_reason(tmp_path):
     lines = events(tmp_path).path.read_text().splitlines()
     later = [line.replace("2026-03-0", "2026-03-1") for line in lines]
     (tmp_path / "holiday").write_text("\n".join(lines + later) + "\n")
@@ -75,7 +75,7 @@ def test_a_week_without_the_person_is_left_out_with_the_reason(tmp_path: Path) -
     assert any("days are left out: the night before or after them isn't" in x for x in told)
 
 
-def test_days_that_begin_before_midnight_are_left_out(tmp_path: Path) -> None:
+def test_days_that_begin_before_midnight_are_left_out(tmp_path):
     """Who slept in the afternoon, as in a log whose clock jumped, got up at -4:10, with a traceback."""
     lines = events(tmp_path).path.read_text().splitlines()
     later = [
@@ -90,7 +90,7 @@ def test_days_that_begin_before_midnight_are_left_out(tmp_path: Path) -> None:
     assert "-4:" not in (tmp_path / "persona.yaml").read_text()
 
 
-def test_too_few_days_are_counted_with_what_is_missing(tmp_path: Path) -> None:
+def test_too_few_days_are_counted_with_what_is_missing(tmp_path):
     lines = events(tmp_path).path.read_text().splitlines()
     (tmp_path / "short").write_text("\n".join(x for x in lines if x < "2026-03-05") + "\n")
     with pytest.raises(LogError, match=r"2 of the 3 days of the log are whole.* log 1 more"):
@@ -98,7 +98,7 @@ def test_too_few_days_are_counted_with_what_is_missing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("left_out", "has"), [("M018", "sleep alone"), ("M003", "no sleep")])
-def test_nights_that_can_not_be_told_are_an_error(left_out: str, has: str, tmp_path: Path) -> None:
+def test_nights_that_can_not_be_told_are_an_error(left_out, has, tmp_path):
     with pytest.raises(LogError, match=f"the log has {has}.*--rooms LABEL=bedroom"):
         fit_routine(events(tmp_path).path, tmp_path / "a.yaml", rooms=[f"{left_out}="])
 
@@ -113,9 +113,7 @@ def test_nights_that_can_not_be_told_are_an_error(left_out: str, has: str, tmp_p
         ({"layout": "caas"}, "--format: expected one of auto, casas"),
     ],
 )
-def test_a_wrong_option_is_told_before_anything_is_written(
-    options: dict[str, object], message: str, tmp_path: Path
-) -> None:
+def test_a_wrong_option_is_told_before_anything_is_written(options, message, tmp_path):
     out = tmp_path / "persona.yaml"
     with pytest.raises(LogError, match=message):
         fit_routine(events(tmp_path).path, out, **options)  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from fleet2d.sight.camera import Camera, TableContext, error_tables
 from fleet2d.sight.perception import Curve, Perception
 
 
-def test_factors_without_effect_are_left_out_and_named() -> None:
+def test_factors_without_effect_are_left_out_and_named():
     log = simulated(7, 4000)
     nothing = np.random.default_rng(8).uniform(0, 60, 4000)
     calibration = calibrate(DetectionLog(log.path, log.distance, log.detected, bearing=nothing))
@@ -28,7 +28,7 @@ def test_factors_without_effect_are_left_out_and_named() -> None:
     assert any("bearing: left out" in line for line in report(calibration))
 
 
-def test_a_model_that_fits_says_so_and_one_that_does_not_too() -> None:
+def test_a_model_that_fits_says_so_and_one_that_does_not_too():
     log = simulated(9, 5000)
     assert calibrate(log).detection.p_value > 0.01
     gap = (log.distance > 1) & (log.distance < 2)  # blind at arm's length: no logistic
@@ -39,14 +39,14 @@ def test_a_model_that_fits_says_so_and_one_that_does_not_too() -> None:
 
 
 @pytest.mark.slow
-def test_the_goodness_of_fit_of_true_models_is_uniform() -> None:
+def test_the_goodness_of_fit_of_true_models_is_uniform():
     """Ten groups of fitted rows: p values below 0.1 in about a tenth of the logs."""
     logs = examples(120)
     low = sum(calibrate(simulated(500 + s, 1500)).detection.p_value < 0.1 for s in range(logs))
     assert low <= (25 if THOROUGH else 8)  # 3.7 deviations above the mean
 
 
-def test_identities_are_fitted_by_distance_with_their_confusion() -> None:
+def test_identities_are_fitted_by_distance_with_their_confusion():
     rng = np.random.default_rng(11)
     rows = 20_000
     distance = rng.uniform(0.3, 6, rows)
@@ -74,7 +74,7 @@ def test_identities_are_fitted_by_distance_with_their_confusion() -> None:
         assert section.identity.right.at(x) + section.identity.mistaken.at(x) <= 1
 
 
-def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1() -> None:
+def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1():
     """Nobody is unknown here, so that right and mistaken add up to 1 everywhere."""
     rng = np.random.default_rng(15)
     rows = 8000
@@ -103,7 +103,7 @@ def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1(
 
 
 @pytest.mark.slow
-def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run() -> None:
+def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run():
     """The whole circle: a simulated camera, its log, and the parameters again."""
     rng = np.random.default_rng(12)
     n = 30_000
@@ -133,7 +133,7 @@ def test_the_log_of_a_run_calibrates_to_the_settings_of_the_run() -> None:
 
 
 @pytest.mark.slow
-def test_a_fragment_runs_and_so_does_a_scenario_that_extends_it(tmp_path: Path) -> None:
+def test_a_fragment_runs_and_so_does_a_scenario_that_extends_it(tmp_path):
     log = simulated(13, 2000, bearing=True, turned=True)
     path = write(
         tmp_path / "detections.csv",
@@ -159,7 +159,7 @@ def test_a_fragment_runs_and_so_does_a_scenario_that_extends_it(tmp_path: Path) 
     assert "true_user" in stored.tables["observations"].column_names
 
 
-def test_a_fragment_is_plain_yaml_with_a_note_of_where_it_comes_from() -> None:
+def test_a_fragment_is_plain_yaml_with_a_note_of_where_it_comes_from():
     text = fragment(calibrate(simulated(14, 1000)), "bolt", None)
     assert text.startswith("# Fitted to 1000 rows of log.csv")
     assert {"camera", "perception"} == yaml.safe_load(text)["robots"]["bolt"].keys()
@@ -169,7 +169,7 @@ ROWS = 60
 GOOD = {"distance": [1.0] * ROWS, "detected": [0, 1] * (ROWS // 2)}
 
 
-def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path: Path) -> None:
+def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path):
     degrees = read_detections(
         write(tmp_path / "a.csv", **GOOD, bearing_deg=[-30, 350] * (ROWS // 2))
     )
@@ -182,7 +182,7 @@ def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path: Path) -> 
     assert [30, 180] == pytest.approx(radians.bearing[:2].tolist())
 
 
-def test_tables_are_read_as_other_logs_are(tmp_path: Path) -> None:
+def test_tables_are_read_as_other_logs_are(tmp_path):
     path = tmp_path / "log.csv"
     rows = [f"{k % 3},5;{'yes' if k % 2 else 'no'}" for k in range(ROWS)]
     path.write_text("\n".join(["Distance;detected", *rows]))
@@ -225,18 +225,14 @@ def test_tables_are_read_as_other_logs_are(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_wrong_logs_are_errors_that_say_where_and_what(
-    tmp_path: Path, columns: dict[str, list[object]], words: list[str]
-) -> None:
+def test_wrong_logs_are_errors_that_say_where_and_what(tmp_path, columns, words):
     with pytest.raises(InputError) as caught:
         read_detections(write(tmp_path / "log.csv", **columns))
     for word in words:
         assert word in str(caught.value)
 
 
-def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(
-    tmp_path: Path,
-) -> None:
+def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(tmp_path):
     log = simulated(16, 50, bearing=True)
     path = write(
         tmp_path / "log.csv",
@@ -249,12 +245,12 @@ def test_a_picture_of_the_smallest_log_is_drawn_and_one_of_another_kind_refused(
     assert not (tmp_path / "b.yaml").exists()
 
 
-def test_a_file_that_is_no_text_is_an_error(tmp_path: Path) -> None:
+def test_a_file_that_is_no_text_is_an_error(tmp_path):
     (tmp_path / "log.csv").write_bytes(b"distance,detected\n\xe9,1\n")
     with pytest.raises(InputError, match="not text in UTF-8"):
         read_detections(tmp_path / "log.csv")
 
 
-def test_a_log_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+def test_a_log_that_is_not_there_is_an_error(tmp_path):
     with pytest.raises(InputError, match="can't be read"):
         read_detections(tmp_path / "none.csv")

@@ -89,18 +89,18 @@ def timeline_of(path: Path) -> Timeline:
 
 
 @pytest.fixture(scope="module")
-def life(tmp_path_factory: pytest.TempPathFactory) -> Timeline:
+def life(tmp_path_factory):
     return timeline_of(write_life(tmp_path_factory.mktemp("life")))
 
 
-def test_days_go_from_waking_to_bed(life: Timeline) -> None:
+def test_days_go_from_waking_to_bed(life):
     days = find_days(life)
     assert list(range(1, 23)) == [day.number for day in days][:22]
     assert all(7 * 60 - 11 <= day.wake <= 7 * 60 + 11 for day in days)
     assert {23 * 60} == {day.bed for day in days}
 
 
-def test_a_known_life_is_kept_to(life: Timeline) -> None:
+def test_a_known_life_is_kept_to(life):
     days = find_days(life)
     fitted = fit_persona(life, days)
     assert ["weekday", "weekend"] == list(fitted.persona.days)
@@ -115,7 +115,7 @@ def test_a_known_life_is_kept_to(life: Timeline) -> None:
     assert distances(real, rooms, len(life.places)).share < 0.03
 
 
-def test_nights_away_are_lived_away() -> None:
+def test_nights_away_are_lived_away():
     minutes = np.zeros((20, DAY_MINUTES), np.int16)  # days in the living room
     minutes[:, 23 * 60 :] = 1
     minutes[:, : 7 * 60] = 1
@@ -133,7 +133,7 @@ def test_nights_away_are_lived_away() -> None:
     assert away.mean() == pytest.approx((minutes == 2).mean(), abs=0.08)
 
 
-def test_the_written_persona_reads_back_as_the_fitted_one(life: Timeline, tmp_path: Path) -> None:
+def test_the_written_persona_reads_back_as_the_fitted_one(life, tmp_path):
     fitted = fit_persona(life, find_days(life), "fitted to: a, b")
     file = tmp_path / "persona.yaml"
     file.write_text(to_yaml(fitted.document), encoding="utf-8")
@@ -141,14 +141,14 @@ def test_the_written_persona_reads_back_as_the_fitted_one(life: Timeline, tmp_pa
     assert fitted.persona == Persona.model_validate(read_persona(str(file)))
 
 
-def test_one_seed_samples_the_same_days_and_another_others(life: Timeline) -> None:
+def test_one_seed_samples_the_same_days_and_another_others(life):
     fitted = fit_persona(life, find_days(life))
     first, second, other = (sample_persona(fitted, life, 5, seed)[1] for seed in (1, 1, 2))
     assert (first == second).all()
     assert (first != other).any()
 
 
-def test_a_markov_chain_keeps_the_shares_of_time(life: Timeline) -> None:
+def test_a_markov_chain_keeps_the_shares_of_time(life):
     count = len(life.places)
     chain = sample_markov(life.rooms, count, 400)
     assert shares(life.rooms, count) == pytest.approx(shares(chain, count), abs=0.05)
@@ -158,9 +158,7 @@ def test_a_markov_chain_keeps_the_shares_of_time(life: Timeline) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", some(LOGS, 3))
-def test_days_of_real_logs_held_back_are_matched_as_well_as_by_copies(
-    shared_data: Path, name: str
-) -> None:
+def test_days_of_real_logs_held_back_are_matched_as_well_as_by_copies(shared_data, name):
     validation = validate(timeline_of(shared_data / "activity" / name))
     persona, copies, chain, _ = validation.rooms
     assert persona.ks < copies.ks + 0.005
@@ -170,14 +168,14 @@ def test_days_of_real_logs_held_back_are_matched_as_well_as_by_copies(
     assert persona.stay_min < 0.7 * chain.stay_min
 
 
-def test_a_fitted_persona_lives_days_that_nobody_lived(life: Timeline) -> None:
+def test_a_fitted_persona_lives_days_that_nobody_lived(life):
     days = find_days(life)
     sampled = sample_persona(fit_persona(life, days), life, 60)[1]
     lived = {row.tobytes() for row in life.rooms}
     assert sum(row.tobytes() not in lived for row in sampled) > 30
 
 
-def test_the_report_names_what_is_worse_than_copying() -> None:
+def test_the_report_names_what_is_worse_than_copying():
     near, far = RoutineDistances(0.1, 0.2, 0.1, 5, 0.1), RoutineDistances(0.1, 0.1, 0.2, 5, 0.1)
     models, equal = (near, far, near, near), (near, near, near, near)
     assert ["hours 0.200, copies 0.100"] == Validation(
@@ -188,7 +186,7 @@ def test_the_report_names_what_is_worse_than_copying() -> None:
     ).worse_than_copying()
 
 
-def test_stays_of_seconds_are_lived_as_recorded(shared_data: Path) -> None:
+def test_stays_of_seconds_are_lived_as_recorded(shared_data):
     """By minutes alone, a person of CASAS AL went for a moment to a room 24 instead of 38 times."""
     timeline = timeline_of(shared_data / "activity" / LOGS[2])
     days = find_days(timeline)
@@ -208,9 +206,7 @@ def test_stays_of_seconds_are_lived_as_recorded(shared_data: Path) -> None:
 # Privacy
 
 
-def test_days_of_a_private_persona_are_none_of_the_log_and_repeat_little_of_it(
-    life: Timeline,
-) -> None:
+def test_days_of_a_private_persona_are_none_of_the_log_and_repeat_little_of_it(life):
     days = find_days(life)
     plain, private = fit_persona(life, days), fit_persona(life, days, private=True)
     texts = {text for day in plain.document["days"].values() for text in day["recorded"]}
@@ -226,7 +222,7 @@ def test_days_of_a_private_persona_are_none_of_the_log_and_repeat_little_of_it(
     assert not any("takes" in fields for fields in private.document["activities"].values())
 
 
-def test_what_was_done_on_one_day_only_is_not_in_a_private_persona() -> None:
+def test_what_was_done_on_one_day_only_is_not_in_a_private_persona():
     usual = "07:00 wash, 07:20 tv, 23:00 sleep, 31:00 end"
     once = "07:05 wash, 07:30 tv, 15:00 court_hearing, 17:00 tv, 22:30 sleep, 31:10 end"
     made = private_days([parse_day(text) for text in (usual, once, usual)], 0)
@@ -235,16 +231,14 @@ def test_what_was_done_on_one_day_only_is_not_in_a_private_persona() -> None:
 
 @pytest.mark.skipif(not THOROUGH, reason="FLEET2D_THOROUGH=1 has it")
 @pytest.mark.parametrize("name", LOGS)
-def test_a_private_persona_is_nearly_as_close_to_days_held_back(
-    shared_data: Path, name: str
-) -> None:
+def test_a_private_persona_is_nearly_as_close_to_days_held_back(shared_data, name):
     validation = validate(timeline_of(shared_data / "activity" / name), private=True)
     (persona, _, chain, _), (exact, _, exact_chain, _) = validation.rooms, validation.seconds
     assert persona.hours < 0.55 * chain.hours
     assert exact.ks < 0.85 * exact_chain.ks
 
 
-def test_what_is_not_in_a_log_is_said() -> None:
+def test_what_is_not_in_a_log_is_said():
     minutes = np.zeros((6, DAY_MINUTES), np.int16)
     minutes[:, 12 * 60 : 18 * 60] = -1
     minutes[:, 23 * 60 :], minutes[:, : 7 * 60] = 1, 1
@@ -259,7 +253,7 @@ def test_what_is_not_in_a_log_is_said() -> None:
     assert "kitchen" not in notes
 
 
-def test_rooms_whose_kind_nobody_knows_are_said() -> None:
+def test_rooms_whose_kind_nobody_knows_are_said():
     minutes = np.zeros((6, DAY_MINUTES), np.int16)
     minutes[:, 23 * 60 :], minutes[:, : 7 * 60] = 1, 1
     states = (ActivityPlace("", "zimmer_9"), ActivityPlace("sleep", "bedroom"))
@@ -280,7 +274,7 @@ WHOLE = st.lists(st.integers(1, 50), min_size=1, max_size=30).map(
 
 
 @given(a=WHOLE, b=WHOLE)
-def test_distances_of_samples_agree_with_their_definitions(a: np.ndarray, b: np.ndarray) -> None:
+def test_distances_of_samples_agree_with_their_definitions(a, b):
     points = np.arange(0, 51)
     below_a = np.array([(a <= p).mean() for p in points])
     below_b = np.array([(b <= p).mean() for p in points])
@@ -289,7 +283,7 @@ def test_distances_of_samples_agree_with_their_definitions(a: np.ndarray, b: np.
     assert ks_distance(a, a) == wasserstein(a, a) == 0
 
 
-def test_stays_that_midnight_or_a_gap_cuts_are_left_out() -> None:
+def test_stays_that_midnight_or_a_gap_cuts_are_left_out():
     day = np.zeros(DAY_MINUTES, np.int16)
     day[100:110] = 1
     day[200:230] = -1
@@ -298,7 +292,7 @@ def test_stays_that_midnight_or_a_gap_cuts_are_left_out() -> None:
     assert [[], [5.0, 10.0]] == [list(x) for x in dwell_times(day[None], 2)]
 
 
-def test_equal_days_have_no_distance_and_shares_add_up(life: Timeline) -> None:
+def test_equal_days_have_no_distance_and_shares_add_up(life):
     count = len(life.places)
     assert (0, 0, 0, 0, 0) == distances(life.rooms, life.rooms, count)
     assert np.ones(24) == pytest.approx(by_hour(life.rooms, count).sum(axis=1))
@@ -309,8 +303,8 @@ def test_equal_days_have_no_distance_and_shares_add_up(life: Timeline) -> None:
 
 @pytest.mark.slow
 def test_the_command_writes_a_persona_and_a_picture_and_says_how_good_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, monkeypatch, capsys
+):
     log = write_life(tmp_path, 12)
     monkeypatch.chdir(tmp_path)
     arguments = ["fit", "persona", str(log), "--out", "ana.yaml", "--picture", "ana.png"]
@@ -334,9 +328,7 @@ def test_the_command_writes_a_persona_and_a_picture_and_says_how_good_it_is(
         (lambda folder: _csv(folder), "is a log of positions"),
     ],
 )
-def test_a_log_that_nothing_can_be_fitted_to_is_refused(
-    tmp_path: Path, make: object, message: str
-) -> None:
+def test_a_log_that_nothing_can_be_fitted_to_is_refused(tmp_path, make, message):
     with pytest.raises(LogError, match=message):
         fit_routine(make(tmp_path), tmp_path / "persona.yaml")  # type: ignore[operator]
     assert not (tmp_path / "persona.yaml").exists()

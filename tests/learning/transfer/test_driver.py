@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 import yaml
 from tests.learning.transfer.homes import write_home
-from tests.scenes import Cli
 from tests.thorough import THOROUGH
 
 from fleet2d.errors import RunDirectoryError, ScenarioError
@@ -35,7 +34,7 @@ SETTINGS: dict[str, Any] = {
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def file(tmp_path_factory):
     pytest.importorskip("sklearn", reason="needs the extra transfer")
     folder = tmp_path_factory.mktemp("transfer")
     homes = {
@@ -47,7 +46,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def made(file: Path) -> Study:
+def made(file):
     with open_crew("serial") as crew:
         counts = run_transfer(read_plan(file), file.parent / "made", crew)
     assert (counts.total, counts.complete) == (28, 28)
@@ -64,8 +63,8 @@ class Killed(BaseException):
 
 
 def test_a_kill_loses_only_the_cell_under_way_and_results_are_the_same(
-    file: Path, made: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    file, made, tmp_path, monkeypatch
+):
     trained: list[Any] = []
     score = learners.forecast
 
@@ -87,16 +86,14 @@ def test_a_kill_loses_only_the_cell_under_way_and_results_are_the_same(
     assert scores(made) == scores(open_study(tmp_path / "out"))
 
 
-def test_results_of_other_settings_are_refused_until_they_may_go(
-    file: Path, made: Study, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_results_of_other_settings_are_refused_until_they_may_go(file, made, monkeypatch):
     other = file.with_name("other.yaml")
     other.write_text(file.read_text().replace("rows: 300", "rows: 301"))
     with open_crew("serial") as crew, pytest.raises(RunDirectoryError, match="--changed redo"):
         run_transfer(read_plan(other), Path(made.location), crew)
 
 
-def test_differences_are_paired_by_home_and_by_day(made: Study) -> None:
+def test_differences_are_paired_by_home_and_by_day(made):
     rows = compared(made, "room in 60 min", "real").filter(arm="both", days=3).to_dicts()
     (row,) = rows
     assert 2 == row["pairs"]
@@ -108,8 +105,8 @@ def test_differences_are_paired_by_home_and_by_day(made: Study) -> None:
 
 
 def test_the_command_prints_sentences_and_writes_a_table_and_a_figure_for_each_task(
-    file: Path, made: Study, fleet2d: Cli
-) -> None:
+    file, made, fleet2d
+):
     code, out, err = fleet2d("transfer", file, "--out", made.location)
     assert (0, "") == (code, err)
     *sentences, last = out.splitlines()
@@ -123,7 +120,7 @@ def test_the_command_prints_sentences_and_writes_a_table_and_a_figure_for_each_t
 
 
 @pytest.fixture
-def examples(tmp_path: Path, shared_data: Path) -> Path:
+def examples(tmp_path, shared_data):
     """The examples beside the logs that they name."""
     folder = shutil.copytree(
         Path(__file__).parents[3] / "examples" / "transfer", tmp_path / "examples"
@@ -133,14 +130,14 @@ def examples(tmp_path: Path, shared_data: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", ["real_homes", "presence"])
-def test_an_example_can_be_trained_and_scored(examples: Path, fleet2d: Cli, name: str) -> None:
+def test_an_example_can_be_trained_and_scored(examples, fleet2d, name):
     code, out, err = fleet2d("transfer", examples / f"{name}.yaml", "--dry-run")
     assert 0 == code, err
     assert int(out.split()[0]) > 50
 
 
 @pytest.mark.skipif(not THOROUGH, reason="a minute of simulation and training")
-def test_the_small_example_tells_its_result_of_real_homes(examples: Path, fleet2d: Cli) -> None:
+def test_the_small_example_tells_its_result_of_real_homes(examples, fleet2d):
     pytest.importorskip("sklearn", reason="needs the extra transfer")
     code, out, _ = fleet2d("transfer", examples / "small.yaml", "--out", examples / "small")
     assert 0 == code
@@ -153,8 +150,8 @@ def test_the_small_example_tells_its_result_of_real_homes(examples: Path, fleet2
 
 
 def test_people_who_fit_into_no_home_are_left_out_with_their_cells(
-    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fleet2d: Cli
-) -> None:
+    file, tmp_path, monkeypatch, fleet2d
+):
     check = generate.check_dataset
 
     def finds_no_room(content: Any, *arguments: Any, **keys: Any) -> None:
@@ -182,7 +179,7 @@ def test_people_who_fit_into_no_home_are_left_out_with_their_cells(
     assert (2, True) == (code, "no model can be trained and scored" in err)
 
 
-def test_a_cell_is_no_run_that_can_be_repeated(made: Study, fleet2d: Cli) -> None:
+def test_a_cell_is_no_run_that_can_be_repeated(made, fleet2d):
     code, _, err = fleet2d("study", "rerun", made.location, "0")
     assert 2 == code
     assert "are no runs of scenarios" in err

@@ -1,7 +1,6 @@
 """Models of rooms and activities: what they see, and outcomes that the training never saw."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,16 +8,16 @@ from tests.learning.transfer.homes import write_home
 from tests.learning.transfer.test_traces import trace_of
 
 from fleet2d.learning.transfer.learners import FLOOR, forecast, moments
-from fleet2d.learning.transfer.traces import CLASSES, KINDS, MinuteTrace
+from fleet2d.learning.transfer.traces import CLASSES, KINDS
 
 
 @pytest.fixture
-def trace(tmp_path: Path) -> MinuteTrace:
+def trace(tmp_path):
     return trace_of(write_home(tmp_path / "home.txt", 8))
 
 
 @pytest.mark.parametrize("task", ["room in 60 min", "activity"])
-def test_features_know_nothing_of_later_minutes(trace: MinuteTrace, task: str) -> None:
+def test_features_know_nothing_of_later_minutes(trace, task):
     cut = 3 * 1440 + 700
     later = replace(trace, rooms=trace.rooms.copy(), sensors=trace.sensors.copy())
     later.rooms[cut:] = 2
@@ -29,14 +28,14 @@ def test_features_know_nothing_of_later_minutes(trace: MinuteTrace, task: str) -
     assert (whole.inputs[:count] == other.inputs[:count]).all()
 
 
-def test_an_outcome_is_the_room_that_many_minutes_later(trace: MinuteTrace) -> None:
+def test_an_outcome_is_the_room_that_many_minutes_later(trace):
     found = moments(trace, "room in 120 min")
     at = next(k for k in range(len(found.day)) if found.inputs[k, 3] == 8.5)  # half past eight
     assert "away" == KINDS[found.outcome[at]]
 
 
 @pytest.mark.parametrize("task", ["room in 60 min", "activity"])
-def test_outcomes_never_seen_are_counted_and_cost_the_floor(trace: MinuteTrace, task: str) -> None:
+def test_outcomes_never_seen_are_counted_and_cost_the_floor(trace, task):
     pytest.importorskip("sklearn", reason="needs the extra transfer")
     every = moments(trace, task)
     count = len(CLASSES if task == "activity" else KINDS)

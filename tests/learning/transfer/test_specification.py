@@ -19,7 +19,7 @@ def plan(folder: Path, homes: dict[str, Any], **keys: Any) -> TransferPlan:
 
 
 @pytest.fixture
-def homes(tmp_path: Path) -> dict[str, Any]:
+def homes(tmp_path):
     """Two homes that are fit."""
     return {
         name: {"path": str(write_home(tmp_path / f"{name}.txt", 9, shift_min=shift))}
@@ -27,9 +27,7 @@ def homes(tmp_path: Path) -> dict[str, Any]:
     }
 
 
-def test_a_fit_file_has_a_cell_for_each_arm_that_has_its_days(
-    tmp_path: Path, homes: dict[str, Any]
-) -> None:
+def test_a_fit_file_has_a_cell_for_each_arm_that_has_its_days(tmp_path, homes):
     made = plan(tmp_path, homes, learners=["usual"])
     arms = {cell[3:] for cell in made.cells if cell.home == "one"}
     assert {("real", 0), ("survey", 0), ("own", 3), ("fitted", 3), ("copied", 3)} <= arms
@@ -61,9 +59,7 @@ ODD = {
 
 
 @pytest.mark.parametrize("case", ODD)
-def test_an_odd_home_is_named_with_its_reason_and_left_out_if_asked(
-    tmp_path: Path, homes: dict[str, Any], case: str
-) -> None:
+def test_an_odd_home_is_named_with_its_reason_and_left_out_if_asked(tmp_path, homes, case):
     made, keys, reason = ODD[case]
     odd = {"path": str(write_home(tmp_path / "odd.txt", **made)), **keys}
     with pytest.raises(ScenarioError, match=f"odd: .*{reason}") as caught:
@@ -76,7 +72,7 @@ def test_an_odd_home_is_named_with_its_reason_and_left_out_if_asked(
     assert {"one", "two"} <= {cell.home for cell in without.cells}
 
 
-def test_all_that_is_unfit_is_told_at_once(tmp_path: Path, homes: dict[str, Any]) -> None:
+def test_all_that_is_unfit_is_told_at_once(tmp_path, homes):
     short = {"path": str(write_home(tmp_path / "short.txt", 3))}
     blind = {"path": str(write_home(tmp_path / "blind.txt", 9)), "rooms": {"M9": "kitchen"}}
     with pytest.raises(ScenarioError) as caught:
@@ -86,11 +82,11 @@ def test_all_that_is_unfit_is_told_at_once(tmp_path: Path, homes: dict[str, Any]
     }
 
 
-def test_a_single_home_has_no_others_to_learn_from(tmp_path: Path, homes: dict[str, Any]) -> None:
+def test_a_single_home_has_no_others_to_learn_from(tmp_path, homes):
     with pytest.raises(ScenarioError, match="one: there is no other real home"):
         plan(tmp_path, {"one": homes["one"]})
 
 
-def test_a_wrong_key_is_named_with_its_line(tmp_path: Path, homes: dict[str, Any]) -> None:
+def test_a_wrong_key_is_named_with_its_line(tmp_path, homes):
     with pytest.raises(ScenarioError, match=r"homes.yaml:\d+.*test_day"):
         plan(tmp_path, homes, test_day=4)

@@ -28,7 +28,7 @@ def trace_of(path: Path) -> MinuteTrace:
 
 
 @pytest.fixture
-def trace(tmp_path: Path) -> MinuteTrace:
+def trace(tmp_path):
     return trace_of(write_home(tmp_path / "home.txt", 4))
 
 
@@ -39,9 +39,7 @@ def at(trace: MinuteTrace, clock: str) -> tuple[str, str, str]:
     return KINDS[codes[0]], KINDS[codes[1]], CLASSES[codes[2]]
 
 
-def test_a_minute_has_its_room_the_sensor_that_fired_last_and_a_class_of_activity(
-    trace: MinuteTrace,
-) -> None:
+def test_a_minute_has_its_room_the_sensor_that_fired_last_and_a_class_of_activity(trace):
     assert ("kitchen", "kitchen", "food") == at(trace, "07:30")
     assert ("away", "entry", "out") == at(trace, "11:00")
     assert ("living_room", "living_room", "leisure") == at(trace, "14:00")
@@ -60,18 +58,16 @@ def test_a_minute_has_its_room_the_sensor_that_fired_last_and_a_class_of_activit
         ("", "other"),
     ],
 )
-def test_an_activity_is_of_the_class_that_its_words_say(name: str, expected: str) -> None:
+def test_an_activity_is_of_the_class_that_its_words_say(name, expected):
     assert expected == class_of(name)
 
 
-def test_a_silent_day_is_unknown(tmp_path: Path) -> None:
+def test_a_silent_day_is_unknown(tmp_path):
     trace = trace_of(write_home(tmp_path / "home.txt", 12, silent=range(3, 10)))
     assert [0, 1, 2, 10, 11] == trace.days.tolist()
 
 
-def test_copies_are_days_of_the_home_and_a_chain_makes_the_changes_it_has_seen(
-    trace: MinuteTrace,
-) -> None:
+def test_copies_are_days_of_the_home_and_a_chain_makes_the_changes_it_has_seen(trace):
     days = trace.rooms.reshape(-1, 1440)
     copies = copied(trace, trace.days, 9, seed=1)
     assert all(any((day == one).all() for one in days) for day in copies.rooms.reshape(-1, 1440))
@@ -87,9 +83,7 @@ def test_copies_are_days_of_the_home_and_a_chain_makes_the_changes_it_has_seen(
     assert (chain.rooms == markov(trace, trace.days, 3, seed=1).rooms).all()
 
 
-def test_a_written_log_has_the_rooms_that_it_was_written_from(
-    trace: MinuteTrace, tmp_path: Path
-) -> None:
+def test_a_written_log_has_the_rooms_that_it_was_written_from(trace, tmp_path):
     write_log(trace, date(2024, 3, 4), tmp_path / "copy.txt")
     again = trace_of(tmp_path / "copy.txt")
     both = (again.rooms >= 0) & (trace.rooms >= 0)

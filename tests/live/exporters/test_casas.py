@@ -1,8 +1,5 @@
 """Readings as a text file that tools for CASAS data read."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 from tests.engine.test_sensors import household, plan  # noqa: F401  (a fixture)
 from tests.scenes import run, scenario
@@ -13,7 +10,7 @@ from fleet2d.live.exporters.texts import export_casas
 from fleet2d.logs.layout import read_casas
 
 
-def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path: Path) -> None:  # noqa: F811
+def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan, tmp_path):  # noqa: F811
     stored = run(household(plan))
     path = tmp_path / "log.txt"
     text = export_casas(stored, path, Selection.of(stored))
@@ -28,20 +25,20 @@ def test_file_has_a_line_per_reading_in_the_columns_of_casas(plan: str, tmp_path
     assert activity
 
 
-def test_reader_of_casas_logs_reads_it(plan: str, tmp_path: Path) -> None:  # noqa: F811
+def test_reader_of_casas_logs_reads_it(plan, tmp_path):  # noqa: F811
     path = tmp_path / "log.txt"
     stored = run(household(plan))
     export_casas(stored, path, Selection.of(stored))
     assert read_casas(path)
 
 
-def test_run_without_sensors_is_refused_with_what_to_do(tmp_path: Path) -> None:
+def test_run_without_sensors_is_refused_with_what_to_do(tmp_path):
     stored = run(scenario("1 min"))
     with pytest.raises(RunDirectoryError, match="add objects that sense to its scenario"):
         export_casas(stored, tmp_path / "log.txt", Selection.of(stored))
 
 
-def test_file_that_can_not_be_written_is_named(plan: str, tmp_path: Any) -> None:  # noqa: F811
+def test_file_that_can_not_be_written_is_named(plan, tmp_path):  # noqa: F811
     stored = run(household(plan))
     with pytest.raises(RunDirectoryError, match=r"no/log\.txt can't be written"):
         export_casas(stored, tmp_path / "no" / "log.txt", Selection.of(stored))

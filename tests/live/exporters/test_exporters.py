@@ -5,23 +5,22 @@ from pathlib import Path
 
 import pytest
 from tests.live.exporters.worlds import stored
-from tests.scenes import Cli
 
 from fleet2d.errors import InputError
 from fleet2d.live import exporters
 from fleet2d.live.exporters import exporter, format_of, formats, new_file
 
 
-def test_module_of_a_format_exports() -> None:
+def test_module_of_a_format_exports():
     assert "fleet2d.live.exporters.texts" == exporter("casas").__module__
 
 
-def test_unknown_format_is_refused_with_the_known_ones() -> None:
+def test_unknown_format_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match=r"no exporter 'cassas': did you mean 'casas'\? There are"):
         exporter("cassas")
 
 
-def test_help_of_the_command_names_each_format_and_what_it_is(fleet2d: Cli) -> None:
+def test_help_of_the_command_names_each_format_and_what_it_is(fleet2d):
     _, out, _ = fleet2d("export", "--help")
 
     text = " ".join(out.split())
@@ -30,7 +29,7 @@ def test_help_of_the_command_names_each_format_and_what_it_is(fleet2d: Cli) -> N
         assert f"{name}: {description}" in text
 
 
-def test_formats_of_installed_packages_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_formats_of_installed_packages_are_listed(monkeypatch):
     entry = EntryPoint("from_a_plugin", "somewhere:export", "fleet2d.exporter")
     monkeypatch.setattr(exporters, "_plugins", lambda: EntryPoints([entry]))
 
@@ -48,11 +47,11 @@ def test_formats_of_installed_packages_are_listed(monkeypatch: pytest.MonkeyPatc
         ("w.csv", "csv"),
     ],
 )
-def test_suffix_of_a_file_tells_its_format(name: str, layout: str) -> None:
+def test_suffix_of_a_file_tells_its_format(name, layout):
     assert layout == format_of(Path(name))
 
 
-def test_suffix_of_no_format_is_refused_with_those_there_are(tmp_path: Path, fleet2d: Cli) -> None:
+def test_suffix_of_no_format_is_refused_with_those_there_are(tmp_path, fleet2d):
     run = stored(tmp_path)
 
     code, _, err = fleet2d("export", run, "week.xlsx")
@@ -60,7 +59,7 @@ def test_suffix_of_no_format_is_refused_with_those_there_are(tmp_path: Path, fle
     assert (2, True) == (code, "no format has the suffix '.xlsx'" in err and ".jsonl" in err)
 
 
-def test_command_writes_a_part_of_a_run(tmp_path: Path, fleet2d: Cli) -> None:
+def test_command_writes_a_part_of_a_run(tmp_path, fleet2d):
     run = stored(tmp_path)
 
     code, out, _ = fleet2d(
@@ -81,9 +80,7 @@ def test_command_writes_a_part_of_a_run(tmp_path: Path, fleet2d: Cli) -> None:
         (("--speed", "0"), "w.csv is no film: leave out --speed"),
     ],
 )
-def test_wrong_option_is_one_line(
-    tmp_path: Path, fleet2d: Cli, options: tuple[str, ...], message: str
-) -> None:
+def test_wrong_option_is_one_line(tmp_path, fleet2d, options, message):
     code, out, err = fleet2d("export", stored(tmp_path), "w.csv", *options)
 
     assert (2, "", 1) == (code, out, len(err.splitlines()))
@@ -91,7 +88,7 @@ def test_wrong_option_is_one_line(
     assert not (tmp_path / "w.csv").exists()
 
 
-def test_failed_export_leaves_the_file_as_it_was(tmp_path: Path) -> None:
+def test_failed_export_leaves_the_file_as_it_was(tmp_path):
     path = tmp_path / "w.csv"
     path.write_text("before")
 

@@ -29,7 +29,7 @@ def states_of(path: Path, entity: str) -> list[tuple[str, datetime]]:
 
 
 @pytest.fixture(scope="module")
-def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def database(tmp_path_factory):
     """A day in Berlin."""
     path = tmp_path_factory.mktemp("history") / "home-assistant_v2.db"
     export(berlin(), path)
@@ -42,7 +42,7 @@ def berlin() -> fleet2d.Run:
     return fleet2d.run("bundled:paper", *changes, seed=4)
 
 
-def test_rooms_and_presence_equal_the_poses_at_each_step(database: Path) -> None:
+def test_rooms_and_presence_equal_the_poses_at_each_step(database):
     path = berlin().path("ana", timedelta(seconds=60))
     begin = datetime(2026, 1, 4, 23, 0, tzinfo=UTC)  # midnight in Berlin
     rooms = states_of(database, "sensor.ana_room")
@@ -64,9 +64,9 @@ def berlin_rooms() -> list[str]:
 
 
 def test_our_reader_of_recorders_reads_the_readings_of_sensors(
-    plan: str,  # noqa: F811
-    tmp_path: Path,
-) -> None:
+    plan,  # noqa: F811
+    tmp_path,
+):
     stored = run(household(plan))
     path = tmp_path / "home.db"
     export(stored, path)
@@ -79,13 +79,13 @@ def test_our_reader_of_recorders_reads_the_readings_of_sensors(
     assert [name for name in shown if name.startswith("binary_sensor")] == on
 
 
-def test_a_database_is_its_suffix_and_the_states_of_each_entity_differ(database: Path) -> None:
+def test_a_database_is_its_suffix_and_the_states_of_each_entity_differ(database):
     assert "home_assistant" == format_of(Path("home-assistant_v2.db"))
     states = [state for state, _ in states_of(database, "sensor.astro_room")]
     assert all(first != second for first, second in itertools.pairwise(states))
 
 
-def test_names_that_would_be_one_entity_are_refused(tmp_path: Path) -> None:
+def test_names_that_would_be_one_entity_are_refused(tmp_path):
     home = {
         "extends": "bundled:paper",
         "simulation": {"duration": "1 min"},

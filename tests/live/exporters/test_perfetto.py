@@ -32,7 +32,7 @@ def trace(tmp_path: Path, first: int = 0, end: int | None = None) -> list[dict[s
     return events
 
 
-def test_each_event_has_the_fields_of_its_phase(tmp_path: Path) -> None:
+def test_each_event_has_the_fields_of_its_phase(tmp_path):
     events = trace(tmp_path)
 
     assert FIELDS.keys() == {event["ph"] for event in events}
@@ -47,7 +47,7 @@ def test_each_event_has_the_fields_of_its_phase(tmp_path: Path) -> None:
         assert event["ph"] != "C" or all(isinstance(value, float) for value in values)
 
 
-def test_each_body_is_a_process_and_each_part_of_it_a_named_track(tmp_path: Path) -> None:
+def test_each_body_is_a_process_and_each_part_of_it_a_named_track(tmp_path):
     events = trace(tmp_path)
     names = [e for e in events if e["name"] == "process_name"]
     tracks = [e for e in events if e["name"] == "thread_name" and e["pid"] == 2]
@@ -56,7 +56,7 @@ def test_each_body_is_a_process_and_each_part_of_it_a_named_track(tmp_path: Path
     assert list(enumerate(TRACKS, 1)) == [(e["tid"], e["args"]["name"]) for e in tracks]
 
 
-def test_slices_of_a_track_do_not_overlap(tmp_path: Path) -> None:
+def test_slices_of_a_track_do_not_overlap(tmp_path):
     events = trace(tmp_path)
     for pid in (1, 2):
         for tid in range(1, len(TRACKS) + 1):
@@ -65,14 +65,14 @@ def test_slices_of_a_track_do_not_overlap(tmp_path: Path) -> None:
             assert all(a[1] <= b[0] for a, b in itertools.pairwise(spans)), (pid, tid)
 
 
-def test_times_are_microseconds_since_the_start(tmp_path: Path) -> None:
+def test_times_are_microseconds_since_the_start(tmp_path):
     power = [e for e in trace(tmp_path) if e.get("cat") == "power"]
 
     spans = [(e["ts"], e["dur"], e["name"]) for e in power]
     assert [(300_000_000, 120_000_000, "power_off crash"), (3_000_000_000, 600_000_000, "power_off off")] == spans  # fmt: skip
 
 
-def test_events_are_instants_and_the_charge_is_a_counter(tmp_path: Path) -> None:
+def test_events_are_instants_and_the_charge_is_a_counter(tmp_path):
     events = trace(tmp_path, 600, 7200)
     rows = rows_of(stored().tables["events"], "astro", 600, 7200)
     instants = [e for e in events if e["ph"] == "i" and e["pid"] == 2]
@@ -83,7 +83,7 @@ def test_events_are_instants_and_the_charge_is_a_counter(tmp_path: Path) -> None
     assert [float(row["detail"][:-2]) for row in rows if row["detail"].endswith(" %")] == charges
 
 
-def test_plans_come_from_the_repeated_run_if_decisions_were_not_stored(tmp_path: Path) -> None:
+def test_plans_come_from_the_repeated_run_if_decisions_were_not_stored(tmp_path):
     without = stored(decisions=False)
     export_perfetto(without, tmp_path / "without.json", Selection.of(without))
     trace(tmp_path)
@@ -92,6 +92,6 @@ def test_plans_come_from_the_repeated_run_if_decisions_were_not_stored(tmp_path:
 
 
 @pytest.mark.parametrize("name", ["trace.json", "trace.perfetto"])
-def test_the_format_is_named_or_the_suffix(name: str, tmp_path: Path) -> None:
+def test_the_format_is_named_or_the_suffix(name, tmp_path):
     layout = "perfetto" if name.endswith(".json") else None
     assert "trace events" in export(stored(), tmp_path / name, layout, end=600)

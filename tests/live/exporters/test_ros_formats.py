@@ -4,8 +4,6 @@ import json
 import math
 import signal
 from collections import defaultdict
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,7 @@ Messages = dict[str, list[tuple[int, Any]]]
 
 
 @pytest.fixture(scope="module")
-def from_mcap(tmp_path_factory: pytest.TempPathFactory) -> Messages:
+def from_mcap(tmp_path_factory):
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
@@ -40,7 +38,7 @@ def from_mcap(tmp_path_factory: pytest.TempPathFactory) -> Messages:
     return messages
 
 
-def test_statistics_of_a_file_are_in_the_order_of_its_channels(tmp_path: Path) -> None:
+def test_statistics_of_a_file_are_in_the_order_of_its_channels(tmp_path):
     """Their order was that of a set of names, another one in each process."""
     from mcap.reader import make_reader
 
@@ -55,7 +53,7 @@ def test_statistics_of_a_file_are_in_the_order_of_its_channels(tmp_path: Path) -
 
 
 @pytest.fixture(scope="module")
-def from_bag(tmp_path_factory: pytest.TempPathFactory) -> Messages:
+def from_bag(tmp_path_factory):
     from rosbags.highlevel import AnyReader
 
     path = tmp_path_factory.mktemp("bag") / "day"
@@ -69,7 +67,7 @@ def from_bag(tmp_path_factory: pytest.TempPathFactory) -> Messages:
 
 
 @pytest.fixture(params=["mcap", "rosbag2"])
-def messages(request: pytest.FixtureRequest, from_mcap: Messages, from_bag: Messages) -> Messages:
+def messages(request, from_mcap, from_bag):
     return from_mcap if request.param == "mcap" else from_bag
 
 
@@ -100,9 +98,7 @@ def assert_poses(expected: Any, found: Any) -> None:
         ("astro", ("astro/odom", "astro/base_link")),
     ],
 )
-def test_transforms_are_the_poses_at_home(
-    messages: Messages, name: str, frames: tuple[str, str]
-) -> None:
+def test_transforms_are_the_poses_at_home(messages, name, frames):
     found = []
     for time, message in messages["/tf"]:
         for one in message.transforms:
@@ -124,14 +120,14 @@ def test_transforms_are_the_poses_at_home(
     assert (name == "astro") == (len(found) == everywhere)  # who is away has no transform
 
 
-def test_frames_form_a_tree_from_the_map(messages: Messages) -> None:
+def test_frames_form_a_tree_from_the_map(messages):
     ((_, still),) = messages["/tf_static"]
 
     pairs = {(one.header.frame_id, one.child_frame_id) for one in still.transforms}
     assert {("map", "astro/odom")} == pairs
 
 
-def test_odometry_has_the_poses_and_the_speeds_between_them(messages: Messages) -> None:
+def test_odometry_has_the_poses_and_the_speeds_between_them(messages):
     found, speeds = [], []
     for _, message in messages["/astro/odom"]:
         assert ("astro/odom", "astro/base_link") == (
@@ -148,7 +144,7 @@ def test_odometry_has_the_poses_and_the_speeds_between_them(messages: Messages) 
     np.testing.assert_allclose(moved / 30, np.hypot(*np.array(speeds)[1:].T), atol=1e-12)
 
 
-def test_a_robot_on_stairs_has_no_speed_of_their_length_in_the_plan(tmp_path: Path) -> None:
+def test_a_robot_on_stairs_has_no_speed_of_their_length_in_the_plan(tmp_path):
     """The ends of the stairs are 10 m apart there, which was a speed of 10 m/s."""
     from rosbags.highlevel import AnyReader
 
@@ -172,7 +168,7 @@ def test_a_robot_on_stairs_has_no_speed_of_their_length_in_the_plan(tmp_path: Pa
 
 
 @pytest.mark.parametrize("export", [export_mcap, export_rosbag2])
-def test_topics_that_ros_refuses_are_told(export: Any, tmp_path: Path) -> None:
+def test_topics_that_ros_refuses_are_told(export, tmp_path):
     robots = {"astro": None, "Käfer": {"behaviors": []}, "robot-1": {"behaviors": []}}
     scenario = {"extends": "bundled:paper", "simulation": {"duration": "1 min"}, "robots": robots}
     run = fleet2d.run(scenario)
@@ -182,7 +178,7 @@ def test_topics_that_ros_refuses_are_told(export: Any, tmp_path: Path) -> None:
     assert "ROS" not in export(day(), tmp_path / "day.mcap", part())
 
 
-def test_map_has_the_free_cells_of_the_plan_at_their_places(messages: Messages) -> None:
+def test_map_has_the_free_cells_of_the_plan_at_their_places(messages):
     ((_, grid),) = messages["/map"]
 
     plan = day().plan
@@ -198,7 +194,7 @@ def test_map_has_the_free_cells_of_the_plan_at_their_places(messages: Messages) 
         assert free[row, column], room.name
 
 
-def test_detections_are_the_observations(messages: Messages) -> None:
+def test_detections_are_the_observations(messages):
     found = []
     for _, message in messages["/astro/detections"]:
         for one in message.detections:
@@ -226,7 +222,7 @@ def test_detections_are_the_observations(messages: Messages) -> None:
     assert_poses([(0, 0, 0, row[4]) for row in by[0]], [(0, 0, 0, row[4]) for row in by[1]])
 
 
-def test_events_and_beliefs_are_the_rows_of_the_tables(messages: Messages) -> None:
+def test_events_and_beliefs_are_the_rows_of_the_tables(messages):
     events = [(step_of(e.stamp), e.name, e.function) for _, e in messages["/events"]]
     beliefs = [json.loads(message.data) for _, message in messages["/ltp"]]
 
@@ -236,7 +232,7 @@ def test_events_and_beliefs_are_the_rows_of_the_tables(messages: Messages) -> No
     ]
 
 
-def test_the_log_of_a_robot_is_that_of_its_events_and_moves(messages: Messages) -> None:
+def test_the_log_of_a_robot_is_that_of_its_events_and_moves(messages):
     levels = {"INFO": 2, "WARN": 3, "ERROR": 4}
     entries = robot_log(day(), "astro", FIRST, END)
     found = [
@@ -248,13 +244,13 @@ def test_the_log_of_a_robot_is_that_of_its_events_and_moves(messages: Messages) 
     assert {"drive", "sight"} <= {e.source for e in entries}
 
 
-def test_messages_are_in_order_of_time(messages: Messages) -> None:
+def test_messages_are_in_order_of_time(messages):
     for topic, these in messages.items():
         times = [time for time, _ in these]
         assert sorted(times) == times, topic
 
 
-def test_chunks_of_mcap_files_are_whole_and_indexed(tmp_path: Path) -> None:
+def test_chunks_of_mcap_files_are_whole_and_indexed(tmp_path):
     """Readers without an index find the messages in order, too."""
     from mcap.reader import make_reader
 
@@ -284,7 +280,7 @@ def test_chunks_of_mcap_files_are_whole_and_indexed(tmp_path: Path) -> None:
     assert [message.log_time for _, _, message in later] == expected
 
 
-def test_layout_for_foxglove_names_the_topics_of_the_file(tmp_path: Path) -> None:
+def test_layout_for_foxglove_names_the_topics_of_the_file(tmp_path):
     line = export_mcap(day(), tmp_path / "day.mcap", part())
 
     layout = json.loads((tmp_path / "day.layout.json").read_text())
@@ -294,9 +290,7 @@ def test_layout_for_foxglove_names_the_topics_of_the_file(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("export", "name"), [(export_mcap, "d.mcap"), (export_rosbag2, "d")])
-def test_place_that_can_not_be_written_is_named(
-    export: Callable[..., str], name: str, tmp_path: Path
-) -> None:
+def test_place_that_can_not_be_written_is_named(export, name, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(RunDirectoryError, match=f"{name} can't be written"):
         export(day(), tmp_path / "file" / name, part())
@@ -324,7 +318,7 @@ export_rosbag2(day(), Path(sys.argv[1]), part())
 
 
 @pytest.mark.slow
-def test_a_killed_export_leaves_no_bag_and_the_same_command_makes_it(tmp_path: Path) -> None:
+def test_a_killed_export_leaves_no_bag_and_the_same_command_makes_it(tmp_path):
     """Half of a bag stayed, and the same command refused to replace it."""
     from rosbags.highlevel import AnyReader
 

@@ -1,7 +1,6 @@
 """CSV and JSON Lines have the poses and the rows that the run stored."""
 
 import json
-from pathlib import Path
 
 import pandas as pd
 from tests.live.exporters.worlds import NAMES, day, part, poses, rows
@@ -9,7 +8,7 @@ from tests.live.exporters.worlds import NAMES, day, part, poses, rows
 from fleet2d.live.exporters.texts import export_csv, export_jsonl
 
 
-def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path: Path) -> None:
+def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path):
     export_csv(day(), tmp_path / "day.csv", part())
 
     table = pd.read_csv(tmp_path / "day.csv", parse_dates=["time"], engine="pyarrow")
@@ -24,7 +23,7 @@ def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path: Path) -> None:
     assert pd.Timestamp("2026-01-05 06:00") == table["time"].min()
 
 
-def test_json_lines_have_all_records_in_order_of_time(tmp_path: Path) -> None:
+def test_json_lines_have_all_records_in_order_of_time(tmp_path):
     export_jsonl(day(), tmp_path / "day.jsonl", part())
 
     lines = [json.loads(line) for line in (tmp_path / "day.jsonl").read_text().splitlines()]

@@ -26,7 +26,7 @@ def contents(message: object, kind: str = "pose") -> list[Content]:
 
 
 @pytest.mark.parametrize("frame", ["map", "/map", "", "home/map"])
-def test_a_pose_in_the_map_is_a_pose(frame: str) -> None:
+def test_a_pose_in_the_map_is_a_pose(frame):
     (content,) = contents(stamped(frame_id=frame))
     assert content == {
         "type": "pose",
@@ -38,14 +38,14 @@ def test_a_pose_in_the_map_is_a_pose(frame: str) -> None:
 
 
 @pytest.mark.parametrize("frame", ["astro/base_link", "odom", "mapped", "/astro/odom"])
-def test_a_pose_in_another_frame_is_left_out_and_told(frame: str) -> None:
+def test_a_pose_in_another_frame_is_left_out_and_told(frame):
     (fault,) = contents(stamped(frame_id=frame))
     assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("in other frames", True)
     assert fault.text.startswith(f"/ana/pose is in the frame {frame.lstrip('/')!r}: ")
 
 
-def test_the_stamp_is_the_time_of_a_pose() -> None:
+def test_the_stamp_is_the_time_of_a_pose():
     now = int(time.time()) - 3600
     for stamp in ({"sec": now, "nanosec": 500_000_000}, {"secs": now, "nsecs": 500_000_000}):
         (content,) = contents(stamped(frame_id="map", stamp=stamp))
@@ -53,7 +53,7 @@ def test_the_stamp_is_the_time_of_a_pose() -> None:
         assert content["time"] == now + 0.5
 
 
-def test_the_stamp_0_means_now_and_a_simulated_clock_is_told() -> None:
+def test_the_stamp_0_means_now_and_a_simulated_clock_is_told():
     assert "time" not in str(contents(stamped(stamp={"sec": 0, "nanosec": 0})))
     fault, content = contents(stamped(stamp={"sec": 12, "nanosec": 0}))
     assert isinstance(fault, PeerFault)
@@ -61,14 +61,14 @@ def test_the_stamp_0_means_now_and_a_simulated_clock_is_told() -> None:
     assert "time" not in str(content)
 
 
-def test_a_goal_keeps_its_orientation() -> None:
+def test_a_goal_keeps_its_orientation():
     (content,) = contents(stamped(frame_id="map"), "goal")
     goal: Any = parse_message(content)  # type: ignore[arg-type]
     assert (goal.to, goal.heading_deg) == ((1.0, 2.0), pytest.approx(90))
 
 
 @pytest.mark.parametrize("turn", [{"z": 0, "w": 0}, {"z": None, "w": 1}, {"z": math.nan}, {}])
-def test_a_quaternion_that_says_nothing_is_no_heading(turn: dict[str, Any]) -> None:
+def test_a_quaternion_that_says_nothing_is_no_heading(turn):
     message = stamped(frame_id="map")
     message["pose"]["orientation"] = turn
     fault, content = contents(message)
@@ -88,7 +88,7 @@ def test_a_quaternion_that_says_nothing_is_no_heading(turn: dict[str, Any]) -> N
         ([1], "Input should be a valid dictionary"),
     ],
 )
-def test_a_message_without_a_pose_is_wrong(message: object, why: str) -> None:
+def test_a_message_without_a_pose_is_wrong(message, why):
     (fault,) = contents(message)
     assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("wrong", True)
@@ -114,7 +114,7 @@ def mutated(message: Any, draw: random.Random) -> Any:
     return message
 
 
-def test_no_mutation_of_a_message_is_more_than_a_fault() -> None:
+def test_no_mutation_of_a_message_is_more_than_a_fault():
     draw = random.Random(5)
     stamp = {"sec": int(time.time()), "nanosec": 1}
     message: Any = stamped(frame_id="map", stamp=stamp)
@@ -127,7 +127,7 @@ def test_no_mutation_of_a_message_is_more_than_a_fault() -> None:
                     parse_message(content)  # type: ignore[arg-type]
 
 
-def test_a_stamp_near_the_simulated_time_is_of_its_clock() -> None:
+def test_a_stamp_near_the_simulated_time_is_of_its_clock():
     """Programs that use_sim_time stamp so: by the clock on the wall these would be days late."""
     now_ns = 1_767_614_400 * 10**9
     near = stamped(frame_id="map", stamp={"sec": now_ns // 10**9 - 60, "nanosec": 0})
@@ -136,7 +136,7 @@ def test_a_stamp_near_the_simulated_time_is_of_its_clock() -> None:
 
 
 @pytest.mark.parametrize("is_stamped", [False, True])
-def test_a_twist_is_a_velocity(is_stamped: bool) -> None:
+def test_a_twist_is_a_velocity(is_stamped):
     twist = {"linear": {"x": 0.2, "y": -0.1, "z": 9.0}, "angular": {"z": math.pi / 2}}
     message = {"header": {}, "twist": twist} if is_stamped else twist
     (content,) = velocities_of("astro", "/astro/cmd_vel", message)
@@ -150,7 +150,7 @@ def test_a_twist_is_a_velocity(is_stamped: bool) -> None:
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, None, "fast"])
-def test_a_velocity_that_is_no_finite_number_is_wrong(number: object) -> None:
+def test_a_velocity_that_is_no_finite_number_is_wrong(number):
     (fault,) = velocities_of("astro", "/astro/cmd_vel", {"linear": {"x": number}})
     assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("wrong", True)

@@ -7,7 +7,6 @@ import importlib
 import subprocess
 import sys
 import textwrap
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,7 +46,7 @@ MESSAGES = {
 
 
 @pytest.mark.parametrize("name", MESSAGES)
-def test_bytes_are_those_of_ros(name: str) -> None:
+def test_bytes_are_those_of_ros(name):
     from rclpy.serialization import deserialize_message, serialize_message
 
     from fleet2d.live.ros.rclpy_node import as_mapping, filled
@@ -116,7 +115,7 @@ os._exit(0)
 """
 
 
-def test_a_node_of_ros_hears_and_drives_a_run(tmp_path: Path) -> None:
+def test_a_node_of_ros_hears_and_drives_a_run(tmp_path):
     scene = """
         extends: bundled:paper
         simulation: {duration: 60 s, step: 0.1 s, start: "2026-01-05T12:00", seed: 4}

@@ -6,7 +6,6 @@ import os
 import threading
 import time
 import uuid
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -119,7 +118,7 @@ class Beside:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def without_ros() -> Iterator[None]:
+def without_ros():
     """Have runs speak the protocol of `rmw_zenoh` where ROS is installed, too, as in `.ci/ros`."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ros2, "is_rclpy_there", lambda: False)
@@ -127,12 +126,12 @@ def without_ros() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def beside() -> Iterator[Beside]:
+def beside():
     with Beside() as both:
         yield both
 
 
-def test_a_program_that_comes_late_hears_all_topics(beside: Beside) -> None:
+def test_a_program_that_comes_late_hears_all_topics(beside):
     program = beside.program
     program.wait_for("/clock", 20)
 
@@ -149,7 +148,7 @@ def test_a_program_that_comes_late_hears_all_topics(beside: Beside) -> None:
     assert 0.99 < program.wait_for("/astro/battery_state")["percentage"] <= 1
 
 
-def test_clocks_come_before_the_stamps_of_their_step_and_count_up(beside: Beside) -> None:
+def test_clocks_come_before_the_stamps_of_their_step_and_count_up(beside):
     def stamp(fields: Any) -> int:
         return int(fields["sec"]) * 10**9 + int(fields["nanosec"])
 
@@ -161,7 +160,7 @@ def test_clocks_come_before_the_stamps_of_their_step_and_count_up(beside: Beside
     )
 
 
-def test_the_graph_has_one_node_with_all_entities(beside: Beside) -> None:
+def test_the_graph_has_one_node_with_all_entities(beside):
     tokens = [t.split("/") for t in beside.program.node.entities()]
     kinds = [token[5] for token in tokens]
 
@@ -173,7 +172,7 @@ def test_the_graph_has_one_node_with_all_entities(beside: Beside) -> None:
     assert next(t for t in tokens if t[5] == "MP" and t[9] == "%map")[12] == ":1:,1:,:,:,,"
 
 
-def test_a_goal_is_accepted_told_of_and_reached(beside: Beside) -> None:
+def test_a_goal_is_accepted_told_of_and_reached(beside):
     program = beside.program
     x, y = program.position
 
@@ -195,7 +194,7 @@ def test_a_goal_is_accepted_told_of_and_reached(beside: Beside) -> None:
     assert left[0] == pytest.approx(0.3, abs=0.01)
 
 
-def test_a_goal_in_a_wall_is_aborted_with_the_reason(beside: Beside) -> None:
+def test_a_goal_in_a_wall_is_aborted_with_the_reason(beside):
     accepted, name = beside.program.send(50.0, 50.0)
     result = beside.program.result(name)
 
@@ -207,13 +206,13 @@ def test_a_goal_in_a_wall_is_aborted_with_the_reason(beside: Beside) -> None:
 @pytest.mark.parametrize(
     ("x", "frame"), [(math.nan, "map"), (math.inf, "map"), (9.0, "astro/base_link")]
 )
-def test_what_is_no_goal_is_refused(beside: Beside, x: float, frame: str) -> None:
+def test_what_is_no_goal_is_refused(beside, x, frame):
     accepted, name = beside.program.send(x, 9.0, frame)
     assert not accepted
     assert beside.program.result(name)["status"] == 0
 
 
-def test_a_goal_is_canceled_once(beside: Beside) -> None:
+def test_a_goal_is_canceled_once(beside):
     program = beside.program
     accepted, name = program.send(*place("bathroom_1"))
     time.sleep(0.3)
@@ -225,7 +224,7 @@ def test_a_goal_is_canceled_once(beside: Beside) -> None:
     assert program.cancel(np.arange(16, dtype=np.uint8)) == 2  # it is unknown
 
 
-def test_a_later_goal_ends_the_one_before(beside: Beside) -> None:
+def test_a_later_goal_ends_the_one_before(beside):
     program = beside.program
     _, first = program.send(*place("bathroom_1"))
     _, second = program.send(*place("office_1"))
@@ -240,7 +239,7 @@ def test_a_later_goal_ends_the_one_before(beside: Beside) -> None:
 
 
 @pytest.mark.parametrize("of", ["geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"])
-def test_velocities_move_the_robot_until_they_stop_coming(beside: Beside, of: str) -> None:
+def test_velocities_move_the_robot_until_they_stop_coming(beside, of):
     program = beside.program
     publish = program.node.publisher("/astro/cmd_vel", of)
     time.sleep(0.3)
@@ -257,7 +256,7 @@ def test_velocities_move_the_robot_until_they_stop_coming(beside: Beside, of: st
     assert program.wait_for("/astro/odom")["twist"]["twist"]["angular"]["z"] == 0.0
 
 
-def test_an_initial_pose_puts_the_robot_there_and_goals_go_on(beside: Beside) -> None:
+def test_an_initial_pose_puts_the_robot_there_and_goals_go_on(beside):
     program = beside.program
     x, y = place("office_1")
     of = "geometry_msgs/msg/PoseWithCovarianceStamped"
@@ -273,7 +272,7 @@ def test_an_initial_pose_puts_the_robot_there_and_goals_go_on(beside: Beside) ->
     assert program.result(name)["status"] == ActionStatus.SUCCEEDED
 
 
-def test_open_goals_end_with_the_run_which_stores_what_was_taken(tmp_path: Path) -> None:
+def test_open_goals_end_with_the_run_which_stores_what_was_taken(tmp_path):
     with Beside(out=tmp_path / "run") as both:
         program = both.program
         program.wait_for("/clock", 5)
@@ -291,7 +290,7 @@ def test_open_goals_end_with_the_run_which_stores_what_was_taken(tmp_path: Path)
     assert [act["do"] for act in run.manifest["interventions"]] == ["send"]
 
 
-def test_humble_has_its_own_wire() -> None:
+def test_humble_has_its_own_wire():
     with Beside("humble") as both:
         x, y = both.program.position
         accepted, name = both.program.send(x, y + 0.1)
@@ -299,7 +298,7 @@ def test_humble_has_its_own_wire() -> None:
         assert both.program.result(name)["status"] == ActionStatus.SUCCEEDED
 
 
-def test_one_robot_may_be_without_a_prefix() -> None:
+def test_one_robot_may_be_without_a_prefix():
     peer = Ros2Peer("127.0.0.1", next(_ports), "jazzy/astro")
     bridge = Bridge(fleet2d.Simulation(LIVE, "simulation.duration=2 s"), [peer], speed=0)
     bridge.run()
@@ -308,13 +307,13 @@ def test_one_robot_may_be_without_a_prefix() -> None:
     assert peer._topics.frame("astro", "base_link") == "base_link"
 
 
-def test_a_robot_that_isnt_there_is_told() -> None:
+def test_a_robot_that_isnt_there_is_told():
     peer = open_peer(f"ros2://127.0.0.1:{next(_ports)}/jazzy/asto")
     with pytest.raises(InputError, match="no robot 'asto', but astro"):
         Bridge(fleet2d.Simulation(LIVE, "simulation.duration=2 s"), [peer], speed=0).run()
 
 
-def test_a_speed_that_ros_cant_follow_is_told() -> None:
+def test_a_speed_that_ros_cant_follow_is_told():
     told: list[str] = []
     peer = Ros2Peer("127.0.0.1", next(_ports))
     simulation = fleet2d.Simulation(LIVE, "simulation.duration=2 s")
@@ -322,7 +321,7 @@ def test_a_speed_that_ros_cant_follow_is_told() -> None:
     assert told == ["at more than 10 times real time, timers of ROS skip"]
 
 
-def test_places_of_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_of_an_address(monkeypatch):
     monkeypatch.delenv("ROS_DISTRO", raising=False)
     assert parse_place("") == ("jazzy", None)
     assert parse_place("/kilted/astro") == ("kilted", "astro")
@@ -333,13 +332,13 @@ def test_places_of_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("text", ["x", "-1", "233", "1.0", "²"])
-def test_a_wrong_domain_is_told(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_domain_is_told(text, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", text)
     with pytest.raises(InputError, match="ROS_DOMAIN_ID is"):
         domain_of_environment()
 
 
-def test_a_router_of_another_machine_that_is_missing_is_told_and_found_once_it_is_there() -> None:
+def test_a_router_of_another_machine_that_is_missing_is_told_and_found_once_it_is_there():
     from fleet2d.live.ros.zenoh_node import ZenohNode
 
     port = next(_ports)

@@ -56,14 +56,14 @@ os._exit(0)
 
 
 @pytest.fixture
-def _libraries() -> None:
+def _libraries():
     pytest.importorskip("roslibpy", reason="the extra rosbridge is not installed")
     pytest.importorskip("websockets", reason="the extra live is not installed")
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_libraries")
-def test_a_robot_program_hears_standard_messages_and_sends_goals() -> None:
+def test_a_robot_program_hears_standard_messages_and_sends_goals():
     done = subprocess.run(
         [sys.executable, "-c", SCENE],
         capture_output=True,
@@ -116,7 +116,7 @@ def test_a_robot_program_hears_standard_messages_and_sends_goals() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_libraries")
-def test_a_server_that_is_missing_is_told_and_the_run_goes_on() -> None:
+def test_a_server_that_is_missing_is_told_and_the_run_goes_on():
     code = (
         "import os, fleet2d\nfrom tests.live.scenes import LIVE\n"
         "from fleet2d.live import Bridge, open_peer\n"
@@ -167,7 +167,7 @@ os._exit(0)
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("_libraries")
-def test_a_server_that_sends_garbage_leaves_no_traceback_and_gets_the_map_again() -> None:
+def test_a_server_that_sends_garbage_leaves_no_traceback_and_gets_the_map_again():
     done = subprocess.run(
         [sys.executable, "-c", HOSTILE],
         capture_output=True,

@@ -3,7 +3,7 @@
 import pytest
 
 
-def test_a_scan_measures_the_walls_around() -> None:
+def test_a_scan_measures_the_walls_around():
     import numpy as np
     import shapely
     from tests.live.scenes import place

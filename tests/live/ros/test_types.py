@@ -25,13 +25,13 @@ def kilted() -> RosTypes:
     return types
 
 
-def test_hashes_are_those_of_compiled_types() -> None:
+def test_hashes_are_those_of_compiled_types():
     types = kilted()
     assert len(HASHES) > 150
     assert {name: types.hash(name) for name in HASHES} == HASHES
 
 
-def test_the_three_wires_of_an_action_differ() -> None:
+def test_the_three_wires_of_an_action_differ():
     hashes = {d: RosTypes(d).hash(f"{NAVIGATE}_GetResult") for d in ("humble", "jazzy", "kilted")}
     feedback = {RosTypes(d).hash(f"{NAVIGATE}_FeedbackMessage") for d in ("jazzy", "lyrical")}
 
@@ -42,7 +42,7 @@ def test_the_three_wires_of_an_action_differ() -> None:
 
 
 @pytest.mark.parametrize("distribution", ["humble", "jazzy", "kilted", "lyrical"])
-def test_what_is_left_out_is_zero_or_empty(distribution: str) -> None:
+def test_what_is_left_out_is_zero_or_empty(distribution):
     types = RosTypes(distribution)
     name = f"{NAVIGATE}_FeedbackMessage"
     message = types.decode(name, types.encode(name, {"goal_id": {"uuid": range(16)}}))
@@ -55,7 +55,7 @@ def test_what_is_left_out_is_zero_or_empty(distribution: str) -> None:
     assert message["feedback"]["distance_remaining"] == 0.0
 
 
-def test_messages_come_back_as_they_were() -> None:
+def test_messages_come_back_as_they_were():
     types = RosTypes()
     scan: dict[str, Any] = {"angle_min": -3.0, "ranges": np.array([1.0, np.inf], np.float32)}
     transform = {"child_frame_id": "astro/odom", "transform": {"rotation": {"w": 1.0}}}
@@ -72,23 +72,23 @@ def test_messages_come_back_as_they_were() -> None:
     assert moved[0]["transform"]["rotation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
 
 
-def test_a_field_that_a_type_lacks_is_an_error() -> None:
+def test_a_field_that_a_type_lacks_is_an_error():
     with pytest.raises(KeyError, match="dada"):
         RosTypes().encode("std_msgs/msg/String", {"dada": "x"})
 
 
 @pytest.mark.parametrize("data", [b"", b"\0", b"\0\1\0\0", b"\0\1\0\0\xff\xff\xff\xff", b"text"])
-def test_bytes_that_are_no_message_are_told(data: bytes) -> None:
+def test_bytes_that_are_no_message_are_told(data):
     with pytest.raises(ValueError, match="no std_msgs/msg/String"):
         RosTypes().decode("std_msgs/msg/String", data)
 
 
-def test_an_unknown_distribution_is_told() -> None:
+def test_an_unknown_distribution_is_told():
     with pytest.raises(InputError, match="ROS 2 'jade' is unknown: there are humble, jazzy"):
         RosTypes("jade")
 
 
-def test_names_on_the_wire() -> None:
+def test_names_on_the_wire():
     assert wire_name("nav2_msgs/action/NavigateToPose_SendGoal") == (
         "nav2_msgs::action::dds_::NavigateToPose_SendGoal_"
     )

@@ -2,8 +2,6 @@
 
 import math
 from contextlib import nullcontext
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +14,7 @@ from fleet2d.viewing.pictures.charts import draw_reliability, forecasts_of
 
 
 @pytest.fixture(scope="module")
-def forecast_run() -> Any:
+def forecast_run():
     users = {
         "ana": {"type": "room_sampling", "shares": {"kitchen": 3, "bedroom": 5, "away": 2}},
         "ben": {"type": "meander"},
@@ -37,7 +35,7 @@ def forecast_run() -> Any:
     )
 
 
-def test_forecasts_are_those_stored_and_the_truth_where_users_were(forecast_run: Any) -> None:
+def test_forecasts_are_those_stored_and_the_truth_where_users_were(forecast_run):
     belief, truth = forecasts_of(forecast_run, "rtp")
     rooms = [room.name for room in forecast_run.plan.rooms]
     assert (72, len(rooms) + 1) == belief.shape
@@ -59,16 +57,14 @@ def test_forecasts_are_those_stored_and_the_truth_where_users_were(forecast_run:
             assert place == [*rooms, "away"][truth[36 * number + k]]
 
 
-def test_forecasts_that_are_stored_later_are_compared_with_their_own_moment(
-    forecast_run: Any,
-) -> None:
+def test_forecasts_that_are_stored_later_are_compared_with_their_own_moment(forecast_run):
     (belief, truth), later = forecasts_of(forecast_run, "rtp"), forecasts_of(forecast_run, "later")
     assert np.array_equal(truth, later.truth)
     assert belief == pytest.approx(later.belief, abs=1e-6)
 
 
 @pytest.mark.slow
-def test_the_diagram_is_drawn_the_same_each_time(forecast_run: Any, tmp_path: Path) -> None:
+def test_the_diagram_is_drawn_the_same_each_time(forecast_run, tmp_path):
     for name in ("one.png", "two.png", "three.svg"):
         draw_reliability(forecast_run, "rtp", tmp_path / name)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
@@ -77,25 +73,21 @@ def test_the_diagram_is_drawn_the_same_each_time(forecast_run: Any, tmp_path: Pa
 
 
 @pytest.fixture
-def figure(monkeypatch: pytest.MonkeyPatch) -> Figure:
+def figure(monkeypatch):
     """The figure on which charts are drawn, which stays when its file is written."""
     result = Figure()
     monkeypatch.setattr(charts, "picture", lambda *_: nullcontext(result))
     return result
 
 
-def test_both_panels_have_their_probabilities_at_the_same_places(
-    figure: Figure, tmp_path: Path
-) -> None:
+def test_both_panels_have_their_probabilities_at_the_same_places(figure, tmp_path):
     charts.draw_forecasts("rtp", np.eye(3), np.arange(3), tmp_path / "x.png")
     figure.draw_without_rendering()
     curve, counts = (axes.get_window_extent().intervalx for axes in figure.axes)
     np.testing.assert_allclose(curve, counts)
 
 
-def test_gaps_have_a_panel_for_each_measure_and_a_line_for_each_model(
-    figure: Figure, tmp_path: Path
-) -> None:
+def test_gaps_have_a_panel_for_each_measure_and_a_line_for_each_model(figure, tmp_path):
     gaps = {"0-1 min": (0.5, 0.4, 0.7), "over 4 h": (0.9, math.nan, math.nan)}
     charts.draw_gaps({"log loss": {"routine": gaps, "learned": gaps}}, tmp_path / "x.png")
 
@@ -115,14 +107,12 @@ def test_gaps_have_a_panel_for_each_measure_and_a_line_for_each_model(
         ("key_frames", "no room probabilities"),
     ],
 )
-def test_a_table_without_room_probabilities_is_refused(
-    forecast_run: Any, name: str, why: str, tmp_path: Path
-) -> None:
+def test_a_table_without_room_probabilities_is_refused(forecast_run, name, why, tmp_path):
     with pytest.raises(ArtifactError, match=why):
         draw_reliability(forecast_run, name, tmp_path / "x.png")
     assert not (tmp_path / "x.png").exists()
 
 
-def test_another_ending_is_refused(forecast_run: Any, tmp_path: Path) -> None:
+def test_another_ending_is_refused(forecast_run, tmp_path):
     with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):
         draw_reliability(forecast_run, "rtp", tmp_path / "x.gif")

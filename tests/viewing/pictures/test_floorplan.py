@@ -1,7 +1,6 @@
 import builtins
 import importlib
 import sys
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -21,7 +20,7 @@ from fleet2d.viewing.pictures.floorplan import draw_floorplan, floorplan_axes
 
 
 @pytest.fixture(scope="module")
-def home() -> FloorPlan:
+def home():
     return load_floorplan()
 
 
@@ -38,7 +37,7 @@ def pixels(plan: FloorPlan, *places: tuple[float, float], **options: bool) -> li
 
 
 @pytest.mark.slow
-def test_png_and_svg_are_written_the_same_twice(home: FloorPlan, tmp_path: Path) -> None:
+def test_png_and_svg_are_written_the_same_twice(home, tmp_path):
     for ending, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".PNG", b"\x89PNG")):
         first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
         draw_floorplan(home, first)
@@ -51,7 +50,7 @@ def test_png_and_svg_are_written_the_same_twice(home: FloorPlan, tmp_path: Path)
     }
 
 
-def test_a_users_own_style_changes_nothing(home: FloorPlan, tmp_path: Path) -> None:
+def test_a_users_own_style_changes_nothing(home, tmp_path):
     draw_floorplan(home, tmp_path / "plain.svg")
     with mpl.rc_context({"font.size": 30, "axes.facecolor": "red", "savefig.facecolor": "red"}):
         draw_floorplan(home, tmp_path / "styled.svg")
@@ -60,7 +59,7 @@ def test_a_users_own_style_changes_nothing(home: FloorPlan, tmp_path: Path) -> N
     assert (tmp_path / "plain.svg").read_bytes() == (tmp_path / "styled.svg").read_bytes()
 
 
-def test_colours_show_rooms_walls_and_outside(home: FloorPlan) -> None:
+def test_colours_show_rooms_walls_and_outside(home):
     kitchen, wall, outside = pixels(home, (16.5, 8.0), (4.075, 3.0), (19.5, 1.0), names=False)
 
     _, tiles, _ = floor_of("kitchen")  # each tile is a little paler, or not
@@ -69,7 +68,7 @@ def test_colours_show_rooms_walls_and_outside(home: FloorPlan) -> None:
     assert [1.0, 1.0, 1.0] == outside
 
 
-def test_holes_are_walls_only_near_their_edges() -> None:
+def test_holes_are_walls_only_near_their_edges():
     ring = shapely.difference(shapely.box(0, 0, 10, 10), shapely.box(3, 3, 7, 7))
 
     inside, edge, free = pixels(
@@ -88,7 +87,7 @@ def words(plan: FloorPlan, **options: bool) -> list[str]:
     return [text.get_text() for text in axes.texts]
 
 
-def test_words_name_the_plan_its_rooms_the_scale_and_the_entrance(home: FloorPlan) -> None:
+def test_words_name_the_plan_its_rooms_the_scale_and_the_entrance(home):
     texts = words(home)
 
     assert "family_home\n186.1 m² · 14 rooms" in texts
@@ -101,7 +100,7 @@ def test_words_name_the_plan_its_rooms_the_scale_and_the_entrance(home: FloorPla
     assert {"0", "2.5", "5 m", "entrance"} == set(words(home, names=False, title=False))
 
 
-def test_rooms_too_small_for_their_name_show_their_number() -> None:
+def test_rooms_too_small_for_their_name_show_their_number():
     closets = [
         LabelledRegion(("storage",), shapely.box(0.8 * k, 0, 0.8 * k + 0.8, 0.8)) for k in range(60)
     ]
@@ -114,9 +113,7 @@ def test_rooms_too_small_for_their_name_show_their_number() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("start", ["13f8", "1bb5", "2953", "69c2", "f1ac"])
-def test_empty_tiny_long_slanted_and_large_plans_are_drawn(
-    shared_data: Path, tmp_path: Path, start: str
-) -> None:
+def test_empty_tiny_long_slanted_and_large_plans_are_drawn(shared_data, tmp_path, start):
     (path,) = (shared_data / "houseexpo").glob(f"{start}*.json")
 
     draw_floorplan(load_floorplan(path, 0.2), tmp_path / "plan.png")
@@ -125,14 +122,14 @@ def test_empty_tiny_long_slanted_and_large_plans_are_drawn(
 
 
 @pytest.mark.parametrize("name", ["plan.bmp", "plan", "plan.png.txt"])
-def test_another_ending_is_refused(home: FloorPlan, tmp_path: Path, name: str) -> None:
+def test_another_ending_is_refused(home, tmp_path, name):
     with pytest.raises(InputError, match=r"a picture is written as \.png, \.svg or \.pdf"):
         draw_floorplan(home, tmp_path / name)
 
     assert [] == list(tmp_path.iterdir())
 
 
-def test_a_place_that_cannot_be_written_is_refused(home: FloorPlan, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_refused(home, tmp_path):
     (tmp_path / "taken.png").mkdir()
     for path in (tmp_path / "nowhere" / "plan.png", tmp_path / "taken.png"):
         with pytest.raises(InputError, match=r"can't write the picture .*(plan|taken)\.png"):
@@ -141,7 +138,7 @@ def test_a_place_that_cannot_be_written_is_refused(home: FloorPlan, tmp_path: Pa
     assert ["taken.png"] == [path.name for path in tmp_path.iterdir()]
 
 
-def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_matplotlib_the_extra_is_named(monkeypatch):
     real = builtins.__import__
 
     def without(name: str, *args: Any, **kwargs: Any) -> Any:

@@ -1,7 +1,5 @@
 """Furniture, doorways and areas to keep out of are drawn where they are."""
 
-from pathlib import Path
-
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -22,7 +20,7 @@ def home(**parts: object) -> FloorPlan:
     return FloorPlan.build("home", BOX, [LabelledRegion(("bedroom",), BOX)], **parts)  # type: ignore[arg-type]
 
 
-def test_furniture_is_drawn_as_its_symbol_with_its_front_where_it_looks() -> None:
+def test_furniture_is_drawn_as_its_symbol_with_its_front_where_it_looks():
     things = [
         stand_furniture("table", (2.0, 4.0), size=(2.0, 1.0)),
         stand_furniture("bed", (6.0, 3.0), size=(1.6, 2.0)),
@@ -37,7 +35,7 @@ def test_furniture_is_drawn_as_its_symbol_with_its_front_where_it_looks() -> Non
     assert np.allclose(to_rgb("#b98c58"), back, atol=0.02)
 
 
-def test_what_blocks_nothing_is_seen_through() -> None:
+def test_what_blocks_nothing_is_seen_through():
     empty, rug = home(), home(objects=[stand_furniture("rug", (2.0, 4.0))])
     (floor,), (over,) = (pixels(plan, (2.0, 4.0), names=False) for plan in (empty, rug))
 
@@ -45,7 +43,7 @@ def test_what_blocks_nothing_is_seen_through() -> None:
     assert np.allclose(0.6 * np.array(floor) + 0.4 * opaque, over, atol=0.02)
 
 
-def test_door_is_drawn_at_its_line_and_its_swing() -> None:
+def test_door_is_drawn_at_its_line_and_its_swing():
     wall = shapely.box(3.9, 0, 4.1, 2).union(shapely.box(3.9, 3, 4.1, 6))
     free = BOX.difference(wall)
     shut, gap = (
@@ -58,14 +56,14 @@ def test_door_is_drawn_at_its_line_and_its_swing() -> None:
     assert pixels(shut, leaf, names=False) != pixels(gap, leaf, names=False)
 
 
-def test_names_of_rooms_keep_off_the_furniture() -> None:
+def test_names_of_rooms_keep_off_the_furniture():
     plan = home(objects=[stand_furniture("workbench", (4.0, 3.0), size=(4.0, 4.0))])
 
     assert "workbench" in words(plan)
     assert any("Bedroom" in text for text in words(plan))
 
 
-def test_check_up_is_drawn_with_numbers_and_sentences(tmp_path: Path) -> None:
+def test_check_up_is_drawn_with_numbers_and_sentences(tmp_path):
     shed = shapely.box(10, 0, 13, 3)
     plan = FloorPlan.build(
         "home",
@@ -85,7 +83,7 @@ def test_check_up_is_drawn_with_numbers_and_sentences(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a"])
-def test_check_up_in_another_format_is_refused(name: str, tmp_path: Path) -> None:
+def test_check_up_in_another_format_is_refused(name, tmp_path):
     from fleet2d.errors import InputError
 
     with pytest.raises(InputError, match=r"\.png, \.svg or \.pdf"):

@@ -1,6 +1,5 @@
 """Pictures of layers: colours where there is something, the same bytes twice, clear errors."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ STARTS = {".png": b"\x89PNG", ".svg": b"<?xml"}
 
 
 @pytest.fixture(scope="module")
-def layer_run() -> Any:
+def layer_run():
     content = scenario("3 min", robots={"astro": {"type": "patrol"}})
     content["floorplan"]["layers"] = {
         "explored": {"every": "1 min"},
@@ -45,7 +44,7 @@ def colors(plan: FloorPlan, values: Any, *places: tuple[float, float]) -> list[t
 
 
 @pytest.mark.parametrize("dtype", [np.bool_, np.int64, np.float64])
-def test_only_cells_with_a_value_are_coloured(dtype: Any) -> None:
+def test_only_cells_with_a_value_are_coloured(dtype):
     plan = fleet2d.load_floorplan(flat_path())
     values = np.full(plan.free.shape, {"b": 0, "i": -1, "f": np.nan}[np.dtype(dtype).kind]).astype(
         dtype
@@ -60,7 +59,7 @@ def test_only_cells_with_a_value_are_coloured(dtype: Any) -> None:
     assert empty[1:] == drawn[1:]
 
 
-def test_larger_values_have_another_colour() -> None:
+def test_larger_values_have_another_colour():
     plan = fleet2d.load_floorplan(flat_path())
     values = np.zeros(plan.free.shape)
     values[:, : values.shape[1] // 2] = 4.5
@@ -71,7 +70,7 @@ def test_larger_values_have_another_colour() -> None:
 
 
 @pytest.mark.slow
-def test_png_and_svg_are_written_the_same_twice(layer_run: Any, tmp_path: Path) -> None:
+def test_png_and_svg_are_written_the_same_twice(layer_run, tmp_path):
     cases = [
         (name, ending)
         for name in ("dust", "explored.astro", "last_seen.astro")
@@ -85,14 +84,14 @@ def test_png_and_svg_are_written_the_same_twice(layer_run: Any, tmp_path: Path) 
         assert first.read_bytes() == second.read_bytes()
 
 
-def test_a_layer_of_another_step_is_another_picture(layer_run: Any, tmp_path: Path) -> None:
+def test_a_layer_of_another_step_is_another_picture(layer_run, tmp_path):
     draw_layer(layer_run, "explored.astro", tmp_path / "early.svg", 59)
     draw_layer(layer_run, "explored.astro", tmp_path / "late.svg")
     assert (tmp_path / "early.svg").read_bytes() != (tmp_path / "late.svg").read_bytes()
     assert b"after step 59" not in (tmp_path / "late.svg").read_bytes()
 
 
-def test_what_cannot_be_drawn_is_an_error_that_says_why(layer_run: Any, tmp_path: Path) -> None:
+def test_what_cannot_be_drawn_is_an_error_that_says_why(layer_run, tmp_path):
     with pytest.raises(ArtifactError, match="stored no layer 'mud'"):
         draw_layer(layer_run, "mud", tmp_path / "a.png")
     with pytest.raises(ArtifactError, match="not stored at step 60"):

@@ -1,7 +1,5 @@
 """Pictures of fields of view, and how poses are parsed."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -10,7 +8,6 @@ from tests.scenes import flat_path
 
 import fleet2d
 from fleet2d.errors import InputError, PlacementError
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import Reach
 from fleet2d.sight.cached_fov import Flashlight
 from fleet2d.viewing.pictures.layers import (
@@ -23,11 +20,11 @@ from fleet2d.viewing.pictures.layers import (
 
 
 @pytest.fixture(scope="module")
-def plan() -> FloorPlan:
+def plan():
     return fleet2d.load_floorplan(flat_path())
 
 
-def test_pose_is_three_to_five_numbers() -> None:
+def test_pose_is_three_to_five_numbers():
     assert CameraPose(1.0, 2.0, 90.0, 4.5, 108.0) == parse_pose("1,2,90")
     assert CameraPose(1.0, -2.5, 0.0, 3.0, 360.0) == parse_pose(" 1, -2.5, 0, 3, 360")
 
@@ -36,16 +33,16 @@ def test_pose_is_three_to_five_numbers() -> None:
     "text",
     ["", "1,2", "1,2,3,4,5,6", "a,b,c", "1,2,nan", "1,2,3,0", "1,2,3,4,361", "inf,2,3", "1;2;3"],
 )
-def test_other_pose_is_an_error_that_says_how_it_is_written(text: str) -> None:
+def test_other_pose_is_an_error_that_says_how_it_is_written(text):
     with pytest.raises(InputError, match="write x,y,heading"):
         parse_pose(text)
 
 
-def test_reach_is_in_lattice_units(plan: FloorPlan) -> None:
+def test_reach_is_in_lattice_units(plan):
     assert Reach(0, (2 * 1280) ** 2, 1024) == CameraPose(1, 2, 0, 2.0, 90.0).reach(plan)
 
 
-def test_both_panels_show_what_is_in_view_and_only_that(plan: FloorPlan) -> None:
+def test_both_panels_show_what_is_in_view_and_only_that(plan):
     pose, inside, behind = CameraPose(2.5, 2.5, 0.0, 6.0, 90.0), (4.5, 3.0), (1.0, 2.5)
     hidden = (7.0, 0.5)  # the wall with the door is in the way
     colors = []
@@ -68,7 +65,7 @@ def test_both_panels_show_what_is_in_view_and_only_that(plan: FloorPlan) -> None
 
 
 @pytest.mark.slow
-def test_pictures_are_written_the_same_twice(plan: FloorPlan, tmp_path: Path) -> None:
+def test_pictures_are_written_the_same_twice(plan, tmp_path):
     for ending in (".png", ".svg"):
         files = [tmp_path / f"{n}{ending}" for n in "ab"]
         for file in files:
@@ -76,7 +73,7 @@ def test_pictures_are_written_the_same_twice(plan: FloorPlan, tmp_path: Path) ->
         assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_pose_in_a_wall_or_a_wrong_ending_writes_nothing(plan: FloorPlan, tmp_path: Path) -> None:
+def test_pose_in_a_wall_or_a_wrong_ending_writes_nothing(plan, tmp_path):
     with pytest.raises(PlacementError, match=r"\(-5, 0\) m is in a wall"):
         draw_fov(plan, CameraPose(-5, 0, 0), tmp_path / "a.png")
     with pytest.raises(InputError, match=r"not as '\.jpg'"):

@@ -77,7 +77,7 @@ def words_drawn(run: Run, tmp_path: Path) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", some(["png", "svg"], 2))
-def test_same_run_gives_same_bytes(tmp_path: Path, ending: str) -> None:
+def test_same_run_gives_same_bytes(tmp_path, ending):
     run = base(out=tmp_path / "run")
     picture, repeated = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
     draw_run(run, picture)
@@ -86,7 +86,7 @@ def test_same_run_gives_same_bytes(tmp_path: Path, ending: str) -> None:
     assert [] == list(tmp_path.glob("*.partial"))
 
 
-def test_picture_says_what_was_run(tmp_path: Path) -> None:
+def test_picture_says_what_was_run(tmp_path):
     run = two_days()
     assert run.digest is not None
     words = words_drawn(run, tmp_path)
@@ -107,9 +107,7 @@ def test_picture_says_what_was_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("users", "robots"), [({}, None), (None, {}), ({}, {}), ({"bo": MEANDER}, {"eye": MEANDER})]
 )
-def test_run_without_users_or_robots_is_drawn(
-    tmp_path: Path, users: dict[str, Any] | None, robots: dict[str, Any] | None
-) -> None:
+def test_run_without_users_or_robots_is_drawn(tmp_path, users, robots):
     scenario = fleet2d.load_scenario("bundled:paper", "simulation.duration=3 h").resolved()
     scenario["users"] = scenario["users"] if users is None else users
     scenario["robots"] = scenario["robots"] if robots is None else robots
@@ -126,7 +124,7 @@ def test_run_without_users_or_robots_is_drawn(
         ("artifacts={observations: false, events: false, outputs: false}", "ana"),
     ],
 )
-def test_run_that_stored_less_says_so(override: str, note: str) -> None:
+def test_run_that_stored_less_says_so(override, note):
     assert note in words_of(base(override))
 
 
@@ -144,11 +142,11 @@ def test_run_that_stored_less_says_so(override: str, note: str) -> None:
         2,
     ),
 )
-def test_short_and_long_runs_are_drawn(tmp_path: Path, overrides: tuple[str, ...]) -> None:
+def test_short_and_long_runs_are_drawn(tmp_path, overrides):
     assert "ana" in words_drawn(fleet2d.run("bundled:rounds", *overrides), tmp_path)
 
 
-def test_of_many_users_four_are_shown_and_the_rest_counted() -> None:
+def test_of_many_users_four_are_shown_and_the_rest_counted():
     users = {f"person_{number:02d}": MEANDER for number in range(50)}
     run = fleet2d.run(
         {
@@ -164,30 +162,30 @@ def test_of_many_users_four_are_shown_and_the_rest_counted() -> None:
 
 
 @pytest.mark.slow
-def test_interrupted_run_is_drawn_and_marked(tmp_path: Path) -> None:
+def test_interrupted_run_is_drawn_and_marked(tmp_path):
     simulation = Simulation("bundled:paper", "simulation.duration=2 d")
     simulation.advance(100_000)
     assert "interrupted" in words_drawn(simulation.finish(), tmp_path)
 
 
-def test_run_that_simulated_nothing_is_drawn(tmp_path: Path) -> None:
+def test_run_that_simulated_nothing_is_drawn(tmp_path):
     words = words_drawn(Simulation("bundled:paper").finish(), tmp_path)
     assert "0 s in family_home" in words
 
 
-def test_run_that_lost_its_floor_plan_says_so(tmp_path: Path) -> None:
+def test_run_that_lost_its_floor_plan_says_so(tmp_path):
     base(out=tmp_path / "run")
     (tmp_path / "run" / FLOORPLAN_NAME).unlink()
     with pytest.raises(ArtifactError, match=f"{FLOORPLAN_NAME} is missing"):
         draw_run(open_run(tmp_path / "run"), tmp_path / "a.png")
 
 
-def test_picture_of_another_kind_is_refused(tmp_path: Path) -> None:
+def test_picture_of_another_kind_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"written as \.png, \.svg or"):
         draw_run(two_days(), tmp_path / "run.jpg")
 
 
-def test_colour_that_is_given_is_used(tmp_path: Path) -> None:
+def test_colour_that_is_given_is_used(tmp_path):
     run = base("users.ana.color=teal", "robots.astro.color=no colour")
     ana = trace_of(run, run.plan, "ana", 0, robot=False)
     astro = trace_of(run, run.plan, "astro", 0, robot=True)
@@ -197,7 +195,7 @@ def test_colour_that_is_given_is_used(tmp_path: Path) -> None:
     assert astro.color.startswith("#")
 
 
-def test_areas_that_a_robot_keeps_out_of_are_hatched_and_named() -> None:
+def test_areas_that_a_robot_keeps_out_of_are_hatched_and_named():
     corners = [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]
     run = base(f"robots.astro.keep_out=[{{area: {corners}, during: '22:00-07:00'}}]")
     hatched = [
@@ -211,7 +209,7 @@ def test_areas_that_a_robot_keeps_out_of_are_hatched_and_named() -> None:
     assert "keeps out" not in words_of(base())
 
 
-def test_actogram_has_the_rooms_of_every_minute() -> None:
+def test_actogram_has_the_rooms_of_every_minute():
     run = base("simulation.start=2026-01-09T10:30", "artifacts.trajectories=4 s")
     ana = trace_of(run, run.plan, "ana", 0, robot=False)
     assert ana is not None
@@ -228,7 +226,7 @@ def test_actogram_has_the_rooms_of_every_minute() -> None:
     assert (0.0, 24.0) == hours_shown(rooms)
 
 
-def test_marks_are_the_share_of_five_minutes_that_the_user_was_seen() -> None:
+def test_marks_are_the_share_of_five_minutes_that_the_user_was_seen():
     seen = np.array([0, 299, 300, 300, *range(600, 900), 86_399, 86_400])  # 300 by two robots
     marks = marks_by_day(seen, START, 1_000_000, 2)
     cells = np.argwhere(marks > 0).tolist()
@@ -236,14 +234,14 @@ def test_marks_are_the_share_of_five_minutes_that_the_user_was_seen() -> None:
     assert [2, 1, 300, 1, 1] == np.rint(marks[marks > 0] * 300).astype(int).tolist()
 
 
-def test_a_step_longer_than_a_mark_fills_as_many_marks_as_it_lasts() -> None:
+def test_a_step_longer_than_a_mark_fills_as_many_marks_as_it_lasts():
     half_past = START.replace(hour=10, minute=32, second=30)
     marks = marks_by_day(np.array([0]), half_past, 600_000_000, 1)
     assert [126, 127, 128] == np.flatnonzero(marks[0]).tolist()
     assert [0.5, 1.0, 0.5] == marks[0, 126:129].tolist()
 
 
-def test_no_sightings_leave_no_marks() -> None:
+def test_no_sightings_leave_no_marks():
     marks = marks_by_day(np.zeros(0, np.int64), START, 1_000_000, 3)
     assert (3, 288) == marks.shape
     assert 0 == len(mark_boxes(marks))
@@ -258,7 +256,7 @@ def test_no_sightings_leave_no_marks() -> None:
         (datetime(2026, 3, 28, 12), {119: 13, 120: -2, 179: -2, 180: 14, 1439: 34}),
     ],
 )
-def test_day_is_drawn_by_what_the_clock_reads(noon: datetime, expected: dict[int, int]) -> None:
+def test_day_is_drawn_by_what_the_clock_reads(noon, expected):
     zone = zone_of("Europe/Berlin", noon, noon)
     hours: Any = SimpleNamespace(room=np.arange(50), every_us=3_600_000_000)
     rooms = rooms_by_day(hours, zone.at(noon), 60_000_000, 50 * 60)
@@ -271,7 +269,7 @@ def test_day_is_drawn_by_what_the_clock_reads(noon: datetime, expected: dict[int
     assert marks.max() <= 1
 
 
-def test_ink_of_the_marks_is_in_proportion_to_the_time_seen() -> None:
+def test_ink_of_the_marks_is_in_proportion_to_the_time_seen():
     often = np.flatnonzero(np.arange(2 * 86_400) % 3_600 < 1_200)
     seldom = np.flatnonzero(np.arange(2 * 86_400) % 3_600 < 30)
     always = np.arange(2 * 86_400)
@@ -285,7 +283,7 @@ def test_ink_of_the_marks_is_in_proportion_to_the_time_seen() -> None:
     assert ink[len(seldom)] / full == pytest.approx(30 / 3_600)
 
 
-def test_a_single_sighting_has_a_mark_of_the_least_height_in_its_row() -> None:
+def test_a_single_sighting_has_a_mark_of_the_least_height_in_its_row():
     (box,) = mark_boxes(marks_by_day(np.array([86_400 + 43_200]), START, 1_000_000, 3), 0.1)
     assert [12.0, 12.0 + 1 / 12] == pytest.approx([box[:, 0].min(), box[:, 0].max()])
     assert [1.9 - MARK_PART * MIN_MARK_HEIGHT, 1.9] == pytest.approx(
@@ -293,7 +291,7 @@ def test_a_single_sighting_has_a_mark_of_the_least_height_in_its_row() -> None:
     )
 
 
-def test_ink_in_the_picture_is_in_proportion_too() -> None:
+def test_ink_in_the_picture_is_in_proportion_too():
     def darkness(share: float) -> float:
         figure = Figure(figsize=(4, 4), dpi=150)
         canvas = FigureCanvasAgg(figure)
@@ -312,7 +310,7 @@ def test_ink_in_the_picture_is_in_proportion_too() -> None:
     assert [0.1, 0.5] == pytest.approx([tenth / full, half / full], rel=0.1)
 
 
-def test_presence_everywhere_is_a_faint_tint_and_a_bed_is_no_blot() -> None:
+def test_presence_everywhere_is_a_faint_tint_and_a_bed_is_no_blot():
     free = np.zeros((40, 40), np.bool_)
     free[2:38, 2:38] = True
     uniform = opacity(free * 7.0, free)
@@ -325,7 +323,7 @@ def test_presence_everywhere_is_a_faint_tint_and_a_bed_is_no_blot() -> None:
 
 
 @pytest.mark.slow
-def test_each_user_has_a_line_in_the_legend() -> None:
+def test_each_user_has_a_line_in_the_legend():
     scenario = fleet2d.load_scenario("bundled:paper", "simulation.duration=3 h").resolved()
     scenario["users"] = dict.fromkeys(("ana", "bo", "cleo"), MEANDER)
     words = words_of(fleet2d.run(scenario))
@@ -334,7 +332,7 @@ def test_each_user_has_a_line_in_the_legend() -> None:
 
 
 @pytest.mark.slow
-def test_too_many_rings_are_left_out_with_a_note() -> None:
+def test_too_many_rings_are_left_out_with_a_note():
     few = words_of(two_days())
     assert "seen here by a robot" in few
     assert "are not drawn" not in few
@@ -360,9 +358,7 @@ def saved_plan(path: Path, width: float, height: float) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("size", [(1.9, 1.6), (6.0, 5.0), (30.0, 25.0), (25.0, 3.0), (3.0, 25.0)])
-def test_words_of_the_scale_are_above_the_legend(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: tuple[float, float]
-) -> None:
+def test_words_of_the_scale_are_above_the_legend(tmp_path, monkeypatch, size):
     run = fleet2d.run(
         {
             "simulation": {"duration": "30 min", "seed": 1},
@@ -382,7 +378,7 @@ def test_words_of_the_scale_are_above_the_legend(
 
 
 @pytest.mark.slow
-def test_picture_of_a_narrow_home_is_narrower(tmp_path: Path) -> None:
+def test_picture_of_a_narrow_home_is_narrower(tmp_path):
     widths = []
     for number, size in enumerate([(10.0, 9.0), (5.0, 20.0)]):
         scenario = {
@@ -396,7 +392,7 @@ def test_picture_of_a_narrow_home_is_narrower(tmp_path: Path) -> None:
     assert widths[1] < 1400
 
 
-def test_hash_that_names_a_plan_is_shortened(tmp_path: Path) -> None:
+def test_hash_that_names_a_plan_is_shortened(tmp_path):
     scenario = {
         "simulation": {"duration": "30 min", "seed": 1},
         "floorplan": saved_plan(tmp_path / f"{'2deaa98e' * 4}.json", 5, 4),
@@ -407,14 +403,14 @@ def test_hash_that_names_a_plan_is_shortened(tmp_path: Path) -> None:
     assert "2deaa98e2" not in words
 
 
-def test_rooms_in_the_actogram_are_a_deeper_shade_of_the_plan() -> None:
+def test_rooms_in_the_actogram_are_a_deeper_shade_of_the_plan():
     plan = fleet2d.load_floorplan()
     colors = {room.type: to_rgb(deep_color(room.type)) for room in plan.rooms}
     assert all(0 <= part <= 1 for color in colors.values() for part in color)
     assert colors["kitchen"] != colors["living_room"] != colors["dining_room"]
 
 
-def test_ways_are_not_drawn_across_an_absence_nor_through_walls() -> None:
+def test_ways_are_not_drawn_across_an_absence_nor_through_walls():
     run = two_days()
     ana = trace_of(run, run.plan, "ana", 0, robot=False)
     assert ana is not None
@@ -425,7 +421,7 @@ def test_ways_are_not_drawn_across_an_absence_nor_through_walls() -> None:
         assert VisibleRegion(run.plan, *points[0].tolist()).contains(points[1:]).all()
 
 
-def test_a_way_on_which_a_robot_brakes_is_drawn_as_one_line() -> None:
+def test_a_way_on_which_a_robot_brakes_is_drawn_as_one_line():
     def legs(drive: str) -> Any:
         robot = {"type": "patrol", "waypoints": [[1, 3], [7, 1], [7, 6]], "dwell": "1 s"}
         content = {
@@ -442,7 +438,7 @@ def test_a_way_on_which_a_robot_brakes_is_drawn_as_one_line() -> None:
     assert other[:7] == pytest.approx(usual[:7], abs=0.002)  # a round
 
 
-def test_field_of_view_is_what_is_visible_in_range_and_angle() -> None:
+def test_field_of_view_is_what_is_visible_in_range_and_angle():
     run = two_days()
     camera = run.manifest["scenario"]["robots"]["astro"]["camera"]
     astro = trace_of(run, run.plan, "astro", 0, robot=True)
@@ -458,6 +454,6 @@ def test_field_of_view_is_what_is_visible_in_range_and_angle() -> None:
     assert near <= np.hypot(*(inside[0] - view.xy)) <= far
 
 
-def test_camera_that_sees_all_round_is_drawn(tmp_path: Path) -> None:
+def test_camera_that_sees_all_round_is_drawn(tmp_path):
     run = base("robots.astro.camera={range: [0, 2], angle_deg: 360}", "simulation.duration=3 h")
     assert "what astro sees" in words_drawn(run, tmp_path)
