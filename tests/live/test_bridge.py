@@ -162,11 +162,24 @@ def test_lost_and_late_messages_are_counted_by_their_numbers():
     assert peer.told == ["lost: 2 messages before number 4", "late: message 3 after 4"]
 
 
+def test_a_pulse_shorter_than_a_step_is_seen():
+    """Of on and off in one step a sensor had only the last state, and both were applied."""
+    on, off = ({"type": "reading", "sensor": "front_door", "on": state} for state in (True, False))
+
+    run, _, bridge = bridged({2: [on, off, on, off], 6: [on, on], 8: [off]})
+
+    rows = run.tables["sensors"].select(["step", "state"]).to_pylist()
+    assert [(2, "ON"), (3, "OFF"), (6, "ON"), (8, "OFF")] == [
+        (row["step"], row["state"]) for row in rows
+    ]
+    assert bridge.counts == {"received": 7, "applied": 5, "replaced": 2}
+
+
 def test_of_a_flood_only_some_is_applied():
     flood = [{"type": "reading", "sensor": "front_door", "on": bool(k % 2)} for k in range(5000)]
     _, peer, bridge = bridged({0: flood}, max_per_step=100)
 
-    assert bridge.counts == {"received": 5000, "applied": 100, "too many": 4900}
+    assert bridge.counts == {"received": 5000, "applied": 2, "replaced": 98, "too many": 4900}
     assert peer.told == ["too many: more than 100 messages in a step"]
 
 

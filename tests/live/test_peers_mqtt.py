@@ -161,6 +161,26 @@ def test_a_broker_that_is_missing_is_told_and_hears_the_run_once_it_is_there(tmp
     assert client.of("home/status")[-2:] == ["online", "offline"]
 
 
+@pytest.mark.slow
+def test_two_runs_with_one_prefix_are_told(broker):
+    """Each applied what the other was sent, and neither said so."""
+    told: list[list[str]] = [[], []]
+    address = f"mqtt://127.0.0.1:{broker}/home"
+    bridges = [
+        Bridge(fleet2d.Simulation(LIVE), [open_peer(address)], speed=10, tell=notes.append)
+        for notes in told
+    ]
+    threads = [threading.Thread(target=bridge.run) for bridge in bridges]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+    for bridge, notes in zip(bridges, told, strict=True):
+        assert any("another run has the prefix 'home', too: name one" in note for note in notes)
+        assert bridge.counts["shared prefixes"] == 1
+
+
 def test_an_unknown_host_of_a_broker_is_refused():
     with pytest.raises(InputError, match=r"mqtt://no\.such\.host\.invalid:1883: "):
         open_peer("mqtt://no.such.host.invalid")

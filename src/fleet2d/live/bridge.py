@@ -274,6 +274,7 @@ class Bridge:
         self._times: dict[tuple[Sender, tuple[str, str]], float] = {}  # the last of each part
         self._poses: dict[str, tuple[Sender, int, float, float]] = {}  # the last: step, x, y
         self._names = {*self.simulation.actors, *self.simulation.scenario.objects}
+        self._later: dict[str, tuple[LiveMessage, Sender]] = {}  # readings for the next step
         self._is_stopping = False
 
     def run(self) -> Run:
@@ -338,7 +339,7 @@ class Bridge:
                 due = began + (simulation.step - first) * step_s / self.speed
                 _wait(due, min(LEAD_S, LEAD_SHARE * step_s / self.speed))
                 self.lateness_s.append(time.monotonic() - due)
-            self._apply(self._received())
+            self._apply(self._one_reading_each(self._received()))
             self._stop_the_silent()
             with deferred_interrupt(self._stop):  # half a step could not be stored
                 simulation.advance()
@@ -384,6 +385,29 @@ class Bridge:
             else:
                 orders.add(key)
         return received
+
+    def _one_reading_each(
+        self, received: Sequence[tuple[LiveMessage | None, Sender]]
+    ) -> list[tuple[LiveMessage | None, Sender]]:
+        """Return messages without readings that turn a sensor back within the step.
+
+        The last of these is left for the next step, so that a pulse shorter than a step is seen.
+        """
+        now: list[tuple[LiveMessage | None, Sender]] = []
+        shown: dict[str, bool] = {}
+        waiting = [*self._later.values(), *received]
+        self._later.clear()
+        for message, sender in waiting:
+            if not isinstance(message, ReadingMessage):
+                now.append((message, sender))
+            elif message.sensor in self._later:
+                self.counts["replaced"] += 1
+                self._later[message.sensor] = message, sender
+            elif message.on == shown.setdefault(message.sensor, message.on):
+                now.append((message, sender))
+            else:
+                self._later[message.sensor] = message, sender
+        return now
 
     def _read(self, content: Any, is_full: bool) -> LiveMessage | None:
         """Return a message; None if there is none in the content, or no room for it."""

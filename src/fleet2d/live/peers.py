@@ -12,6 +12,7 @@ import re
 import socket
 import threading
 import time
+import uuid
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from http import HTTPStatus
@@ -53,6 +54,7 @@ WAIT_S = 5.0
 MAX_SENDERS = 16
 # Of more messages before a run, the last ones count; so many are kept for a broker that is gone.
 MAX_EARLY = 1000
+ADVICE = "mqtt://HOST/first and mqtt://HOST/second"
 
 
 class FunctionPeer(Peer):
@@ -363,14 +365,17 @@ class MqttPeer(Peer):
         self._on: dict[str, str] = {}  # the word of each sensor for being on
         self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # "", or why it refuses
         self._post: Post | None = None
-        self._early: deque[bytes] = deque(maxlen=MAX_EARLY)  # what arrives before the run begins
+        # What arrives before the run begins.
+        self._early: deque[bytes | PeerFault] = deque(maxlen=MAX_EARLY)
         self._client: Any = Client(CallbackAPIVersion.VERSION2)
         self._client.max_queued_messages_set(MAX_EARLY)  # while there is no broker
         self._client.username_pw_set(user, password)
         self._client.will_set(f"{prefix}/status", "offline", retain=True)
         self._client.on_connect = self._greet
         self._client.on_subscribe = self._subscribed
-        self._client.on_message = lambda *args: self._receive(args[-1].payload)
+        self._client.on_message = lambda *args: self._receive(args[-1])
+        self._name = uuid.uuid4().hex.encode()  # of this run, among those of the prefix
+        self._others = {self._name}
         self._is_missing = False
         try:
             self._client.connect(host, port)
@@ -404,15 +409,36 @@ class MqttPeer(Peer):
             self._answer(f"the broker refuses the connection: {reason}")
             return
         self._client.subscribe(f"{self.prefix}/in/#", qos=1)
+        self._client.publish(self._meeting, self._name)
         for topic, text in list(self._retained.items()):
             self._client.publish(topic, text, qos=1, retain=True)
+
+    @property
+    def _meeting(self) -> str:
+        """The topic at which runs of one prefix notice each other."""
+        return f"{self.prefix}/in/run"
+
+    def _meet(self, name: bytes) -> None:
+        """Tell that another run has this prefix, and let it notice this one."""
+        if name in self._others or len(self._others) > MAX_SENDERS:
+            return
+        self._others.add(name)
+        self._client.publish(self._meeting, self._name)
+        text = f"{self._address}: another run has the prefix {self.prefix!r}, too"
+        self._hear(PeerFault("shared prefixes", f"{text}: name one for each, as in {ADVICE}"))
 
     def _subscribed(self, *arguments: Any) -> None:
         refused = [reason for reason in arguments[3] if reason.is_failure]
         text = f"the broker refuses the subscription to {self.prefix}/in/#"
         self._answer(f"{text}: {refused[0]}" if refused else "")
 
-    def _receive(self, content: bytes) -> None:
+    def _receive(self, message: Any) -> None:
+        if message.topic == self._meeting:
+            self._meet(message.payload)
+        else:
+            self._hear(message.payload)
+
+    def _hear(self, content: bytes | PeerFault) -> None:
         if self._post is None:
             self._early.append(content)
         else:
