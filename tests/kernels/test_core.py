@@ -4,7 +4,7 @@ import ast
 import copy
 import pickle
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -31,9 +31,7 @@ from fleet2d.kernels import (
     DetectionRule,
     Distances,
     Divisions,
-    ErrorTables,
     GroupRule,
-    Lenses,
     Moments,
     PlaceNetwork,
     Reach,
@@ -84,7 +82,7 @@ def test_the_core_has_functions_classes_and_constants():
     )
 
 
-def parts(name: str) -> Iterator[tuple[str, Any]]:
+def parts(name):
     """Yield a public name of the core, and if it is a class its own public members."""
     yield name, PUBLIC[name]
     if name in CLASSES and type(PUBLIC[name]).__name__ != "EnumType":
@@ -104,9 +102,9 @@ def test_every_name_has_a_docstring(name):
         assert described[:1].isalnum(), part
 
 
-def imported(path: Path) -> set[str]:
+def imported(path):
     """Return the modules that a module imports anywhere in it, in full."""
-    names: set[str] = set()
+    names = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
@@ -187,14 +185,14 @@ NAMED_TUPLES = {
 }
 
 
-def members_declared_in(core: str, name: str) -> tuple[str, ...]:
+def members_declared_in(core, name):
     """The members of a struct of the core, in the order of their declaration."""
     content = re.search(rf"struct {name}(?: : [\w:, ]+)? \{{\n(.*?)\n\}};", core, re.S)
     assert content is not None
     lines = re.sub(r" *//[^\n]*", "", content[1]).splitlines()
     declared = [line for line in lines if re.match(r"    \w", line) and "(" not in line]
     names = [re.sub(r"^ *(?:const )?[\w:]+(?:<[^;]*>)? ", "", line) for line in declared]
-    return tuple(re.match(r" *(\w+)", name)[1] for line in names for name in line.split(","))  # type: ignore[index]
+    return tuple(re.match(r" *(\w+)", name)[1] for line in names for name in line.split(","))
 
 
 def test_named_tuples_have_the_members_of_their_structs_in_order():
@@ -260,25 +258,25 @@ COSTS = np.array([[0, 100, -1, 5], [1000, 0, -1, 0], [0, 0, 0, 20]], np.int32)
 KEY = 2**64 - 3
 
 
-def scene() -> TableContext:
+def scene():
     return TableContext(
         [f"u{i}" for i in range(USERS)], [100.0] * USERS, LATTICE, SECOND, "robots.r"
     )
 
 
-def lenses() -> Lenses:
+def lenses():
     return stack_lenses([c.lens(1280, SECOND) for c in CAMERAS], [True, False], scene())
 
 
-def errors() -> ErrorTables:
+def errors():
     return error_tables([c.lens(1280, SECOND) for c in CAMERAS], [ERRS, None], scene())
 
 
-def signal() -> tuple[np.ndarray, np.ndarray]:
+def signal():
     return np.array([0, 3, 7]), np.array([1.0, 2.0, 0.5])
 
 
-def window() -> _core.Window:
+def window():
     x = np.array([[100, 100, 110, 120, 200, 200, 200, 100, 100]] * 3)
     x[1:] += [[150], [700]]
     away = np.zeros(x.shape, np.uint8)
@@ -286,7 +284,7 @@ def window() -> _core.Window:
     return _core.Window(0, x, x // 2 + 200, x * 7 % 4096, away, (x % 3).astype(np.int8))
 
 
-def poses() -> Any:
+def poses():
     out = empty_poses(STEPS)
     for column in out:
         column[:] = np.arange(STEPS) * 20
@@ -294,59 +292,59 @@ def poses() -> Any:
     return out
 
 
-def track() -> Breakpoints:
+def track():
     row = np.arange(5) * SECOND
     return Breakpoints(row, row // 20_000, row // 30_000, row % 4096, np.zeros(5, np.uint8))
 
 
-def battery() -> BatteryState:
+def battery():
     return BatteryState(0.5, SECOND, -1e-8, -1e-9, 1e-8, 5, 7, is_broken=False)
 
 
-def memory() -> RoomMemory:
+def memory():
     shape = 3, 2
     return RoomMemory(
         np.full(shape, -1), np.zeros((*shape, 24), np.int64), np.zeros(shape, np.int64)
     )
 
 
-def setup() -> CoverageSetup:
+def setup():
     patches = np.full((HOME.rows, HOME.columns), -1, np.int16)
     patches[:6], patches[6:12] = 0, 1
     return CoverageSetup(MESH, lenses(), patches, SECOND, 1, 4)
 
 
-def floor() -> RoomFloor:
+def floor():
     before_walls = np.stack([_core.corner_sums(MASK)] * 4)
     return RoomFloor(MASK.copy(), MASK.copy(), before_walls, MASK.astype(np.int64))
 
 
-def record() -> CoverageRecord:
-    def never() -> Any:
+def record():
+    def never():
         return np.full((HOME.rows, HOME.columns), NEVER, np.int64)
 
     bins = (np.zeros((3, 2), np.int64) for _ in range(2))
     return CoverageRecord(never(), never(), np.zeros(2, np.int64), never(), *bins)
 
 
-def model() -> StayModel:
+def model():
     follow = np.array([[0, 0.6, 0.3, 0.1], [0.5, 0, 0.4, 0.1], [0.7, 0.3, 0, 0]])
     spread = np.array([0.4, 0.6, 1.0, 1.0])
     first = np.array([0, 2, 3, 4])
     return StayModel(np.full(3, 0.9), follow, spread, np.array([0.1, 0.0, 0.0]), first, 0.8)
 
 
-def needs_and_errands() -> tuple[Any, ...]:
+def needs_and_errands():
     """Return a need and an errand of somebody who does four activities, the third of them sleep."""
     often = list(range(1000, 1256))
     need = ([(3, 1024, often)], often, often, (512, 512, 512, 512), 900, (3600, 80_000), [1])
     return [need], [((3, 300, often), None, [1])], [], [1], 2, 4
 
 
-def day_plan() -> tuple[Any, ...]:
+def day_plan():
     """Return the plan of a day: two jobs, the second after the first, and a pastime."""
 
-    def law(shortest: int, longest: int) -> tuple[Any, ...]:
+    def law(shortest, longest):
         return ([shortest, longest], shortest, longest, 0, 1 << 24)
 
     jobs = [
@@ -360,61 +358,61 @@ def day_plan() -> tuple[Any, ...]:
 class OneRoom:
     """A home of one room, in which all routes are known."""
 
-    def spots(self, room: int) -> list[tuple[int, int]]:
+    def spots(self, room):
         return [(100, 500), (1000, 500)]
 
-    def seats(self, setting: object, room: int) -> list[int]:
+    def seats(self, setting, room):
         return [0]
 
-    def seat(self, number: int) -> tuple[int, ...]:
+    def seat(self, number):
         return 300, 900, 7, 1, 300, 880
 
-    def nearest(self, setting: object, x: int, y: int) -> int:
+    def nearest(self, setting, x, y):
         return 0
 
-    def room_at(self, x: int, y: int) -> int:
+    def room_at(self, x, y):
         return 0
 
-    def wait(self, room: int, now: int, takes: int) -> int | None:
+    def wait(self, room, now, takes):
         return 0
 
-    def way_out(self) -> tuple[int, int]:
+    def way_out(self):
         return 100, 500
 
     @staticmethod
-    def walk(course: Any, place: tuple[int, int, int]) -> tuple[Any, int]:
+    def walk(course, place):
         (time, *_), *_ = course
         return (time, 100, 500, 7, 0), 0
 
 
-def resident() -> _core.Resident:
+def resident():
     return _core.Resident(KEY, 1000.0, 500.0, _core.Routes(MESH, corners()), [])
 
 
-def small_moves() -> list[tuple[int, _core.Waits]]:
+def small_moves():
     return [(kind, _core.Waits(np.array([100_000, 900_000]))) for kind in range(3)]
 
 
-def room_use() -> _core.RoomUse:
+def room_use():
     """Return the uses of a bathroom."""
     use = _core.RoomUse()
     use.add(1, 30_000, 40_000)
     return use
 
 
-def venue_of(activity: int) -> _core.CoreVenue:
+def venue_of(activity):
     """Return the venue of an activity, on a spot or at furniture."""
     seats, takes = [0] * activity, ([0, 1], 0, 1, 0, 1)
     return _core.CoreVenue(None, activity, False, 0, 1, [0], seats, [0], small_moves(), takes)
 
 
-def people() -> StayModel:
+def people():
     """Return the model of five people, a group and one more."""
     *arrays, first, detection = model()
     return StayModel(*(np.repeat(part[None], 5, axis=0) for part in arrays), first, detection)
 
 
-def evidence() -> DayEvidence:
+def evidence():
     views = np.zeros((2, 4), np.uint8)
     views[1, 2] = 60
     user, view = np.array([0, 2, 2, 4]), np.array([0, 0, 1, 1, 1])
@@ -422,41 +420,41 @@ def evidence() -> DayEvidence:
     return DayEvidence(np.arange(5), view, views, user, *columns)
 
 
-def stretches() -> Stretches:
+def stretches():
     shown = np.array([[255, 0, 30, 0], [255, 0, 30, 0], [0, 0, 255, 0]], np.uint8)
     begin, patch = np.array([0, 1, 1, 2]), np.array([0, 2])
     return Stretches(np.array([1, 2, 1]), np.arange(3), shown, begin, patch, np.ones(2))
 
 
-def traced_rooms() -> TracedRooms:
+def traced_rooms():
     return TracedRooms(np.array([0.25, 0.75]), np.array([[0.0, 0.4], [0.4, 0.0]]))
 
 
-def traced() -> TracedEvidence:
+def traced():
     seen, belief = np.array([[0.0, 1], [0, 0], [0.5, 0]]), np.full((3, 3), 1 / 3)
     day, minute = np.full(3, 739_000), np.array([5, 6, 7])
     return TracedEvidence(day, minute, 1 - seen, seen, np.zeros((3, 2), np.uint8), belief)
 
 
-def moments() -> Moments:
+def moments():
     return Moments(np.zeros(3), np.zeros((3, 4)), np.zeros(4), np.zeros(3), np.zeros(3))
 
 
-def moments_of_people() -> Moments:
+def moments_of_people():
     return Moments(*(np.repeat(part[None], 5, axis=0) for part in moments()))
 
 
-def region(x: int = 200, y: int = 200) -> tuple[Any, Any]:
+def region(x=200, y=200):
     right, wall = _core.visible_region(MESH, x, y)
     return right, wall
 
 
-def discs() -> Any:
+def discs():
     """Return a body that stands."""
     return np.array([[500, 500, 100]])
 
 
-def corners() -> Corners:
+def corners():
     vertex = np.flatnonzero((MESH.vertices[:, 0] == 500) | (MESH.vertices[:, 0] == 640))
     place = MESH.vertices[vertex]
     return Corners(
@@ -464,14 +462,14 @@ def corners() -> Corners:
     )
 
 
-def timelines() -> _core.Timelines:
+def timelines():
     result = _core.Timelines(2, SECOND)
     result.follow(0, 0, track(), np.array([5]), np.array([0, 1], np.int8))
     result.walk(1, 0, MESH, MESH, WalkRule(np.uint64(5), 9000, 40_000, 500), (100, 100, 0))
     return result
 
 
-def kept(rows: int) -> Distances:
+def kept(rows):
     numbers = np.full((rows, 2), 300)
     return Distances(numbers // 100, numbers, numbers, np.zeros((rows, 2), np.uint8))
 
@@ -927,9 +925,9 @@ CALLS: dict[str, Args] = {
 """A call of every function, constructor and method of the core that takes anything."""
 
 
-def named(name: str) -> Any:
+def named(name):
     """Return a function, class or method of the core."""
-    result: Any = _core
+    result = _core
     for part in name.split("."):
         result = getattr(result, part)
     return result
@@ -954,7 +952,7 @@ def test_a_call_that_is_right_is_answered(name):
 Path_ = tuple[int, ...]
 
 
-def leaves(value: Any, kind: type | tuple[type, ...], at: Path_ = ()) -> Iterator[Path_]:
+def leaves(value, kind, at=()):
     """Yield where in nested tuples values of a kind are."""
     if isinstance(value, tuple | list):
         for i, part in enumerate(value):
@@ -963,14 +961,14 @@ def leaves(value: Any, kind: type | tuple[type, ...], at: Path_ = ()) -> Iterato
         yield at
 
 
-def leaf(value: Any, at: Path_) -> Any:
+def leaf(value, at):
     """Return the value at a place in nested tuples."""
     for i in at:
         value = value[i]
     return value
 
 
-def put(value: Any, at: Path_, new: Any) -> Any:
+def put(value, at, new):
     """Return nested tuples with another value at a place."""
     if not at:
         return new
@@ -982,9 +980,9 @@ ARRAYS = [(name, at) for name, args in CALLS.items() for at in leaves(args(), np
 INTEGERS = [(name, at) for name, args in CALLS.items() for at in leaves(args(), (int, np.integer))]
 
 
-def each(cases: list[tuple[str, Path_]]) -> pytest.MarkDecorator:
+def each(cases):
     """Parametrize a test by the name of a call, with all places in its arguments."""
-    places: dict[str, list[Path_]] = {}
+    places = {}
     for name, at in cases:
         places.setdefault(name, []).append(at)
     return pytest.mark.parametrize(("name", "places"), places.items(), ids=places)
@@ -997,7 +995,7 @@ def test_arrays_of_another_type_are_refused(name, places):
             continue
         array = leaf(CALLS[name](), at)
         other = np.int32 if array.dtype != np.int32 else np.int64
-        wrong: list[Any] = [
+        wrong = [
             array.astype(other),
             array.astype(np.float64 if array.dtype == np.float32 else np.float32),
             array.astype(array.dtype.newbyteorder()) if array.itemsize > 1 else object(),
@@ -1042,7 +1040,7 @@ def test_named_tuples_of_another_length_are_refused(name, places):
     for at in places:
         value = leaf(CALLS[name](), at)
         parts_ = tuple(value)
-        longer_and_shorter: list[Any] = [(), parts_[:-1], (*parts_, parts_[0])]
+        longer_and_shorter = [(), parts_[:-1], (*parts_, parts_[0])]
         if hasattr(value, "_fields") and name != "points_in_reach":
             longer_and_shorter.append(list(value))
         for wrong in longer_and_shorter:
@@ -1080,13 +1078,13 @@ def test_arrays_to_be_written_to_must_be_so_and_lie_in_one_piece(name, places):
                 named(name)(*put(CALLS[name](), at, wrong))
 
 
-def answer(name: str, args: tuple[Any, ...]) -> Any:
+def answer(name, args):
     """Return what a call gives, with all that it has written to."""
     result = named(name)(*args)
     return [result, *(leaf(args, at) for at in WRITTEN.get(name, ()))]
 
 
-def same(one: Any, other: Any) -> bool:
+def same(one, other):
     if isinstance(one, tuple | list):
         return all(same(a, b) for a, b in zip(one, other, strict=True))
     if isinstance(one, np.ndarray):
@@ -1134,7 +1132,7 @@ EXTREME = [-(2**63), -(2**62), -(2**31), -2, -1, 0, 1, 2, 3, 1000, 2**31, 2**40,
 
 
 @st.composite
-def damaged(draw: st.DrawFn) -> tuple[str, tuple[Any, ...]]:
+def damaged(draw):
     """A call with one or two of its arguments damaged: numbers, lengths, or both."""
     name = draw(st.sampled_from(sorted(CALLS)))
     args = CALLS[name]()
@@ -1157,7 +1155,7 @@ def damaged(draw: st.DrawFn) -> tuple[str, tuple[Any, ...]]:
 
 
 @st.composite
-def damaged_array(draw: st.DrawFn, array: Any) -> Any:
+def damaged_array(draw, array):
     """An array with some other numbers in it, or of another length."""
     how = draw(
         st.sampled_from(["numbers", "all numbers", "shorter", "longer", "empty", "no columns"])
@@ -1171,7 +1169,7 @@ def damaged_array(draw: st.DrawFn, array: Any) -> Any:
     if how == "no columns":
         return array[..., :0]
     if array.dtype.kind == "f":
-        new: Any = draw(st.sampled_from([0.0, -1.0, np.nan, np.inf, -np.inf, 1e300, 5e-324]))
+        new = draw(st.sampled_from([0.0, -1.0, np.nan, np.inf, -np.inf, 1e300, 5e-324]))
     elif array.dtype == bool:
         new = draw(st.booleans())
     else:
@@ -1226,7 +1224,7 @@ def test_no_damage_does_more_than_raise_an_error(call):
 # --- States ------------------------------------------------------------------------------------
 
 
-def use_all_methods(instance: Any) -> None:
+def use_all_methods(instance):
     """Ask an object for all that it may be asked."""
     if isinstance(instance, _core.Mesh):
         for x, y in POINTS.tolist():
@@ -1259,7 +1257,7 @@ def use_all_methods(instance: Any) -> None:
         copy.deepcopy(instance).window(11, 40)
 
 
-def grown() -> _core.Timelines:
+def grown():
     """Return timelines with several pieces, some of which are forgotten."""
     result = timelines()
     result.window(0, 20)
@@ -1270,7 +1268,7 @@ def grown() -> _core.Timelines:
     return result
 
 
-def legs() -> _core.Legs:
+def legs():
     """Return legs of every kind."""
     result = _core.Legs()
     result.mark(5, 100, 100, 7, 0)
@@ -1279,7 +1277,7 @@ def legs() -> _core.Legs:
     return result
 
 
-def last_stint() -> _core.LastStint:
+def last_stint():
     """Return what was done last by somebody who was interrupted."""
     args = CALLS["Resident.live"]()
     _core.Resident.live(*args)
@@ -1299,7 +1297,7 @@ STATES: dict[str, Callable[[], Any]] = {
 }
 
 
-def restored(name: str, state: Any) -> Any:
+def restored(name, state):
     """Return what is read from a state."""
     result = PUBLIC[name].__new__(PUBLIC[name])
     result.__setstate__(state)
@@ -1325,7 +1323,7 @@ def test_every_class_that_can_be_written_is_read_here():
 def test_a_state_of_something_else_is_refused(name):
     others = [STATES[n]().__getstate__() for n in STATES if n != name]
     state = STATES[name]().__getstate__()
-    wrong: list[Any] = [(), (1,), None, 3, "state", (None,) * len(state)]
+    wrong = [(), (1,), None, 3, "state", (None,) * len(state)]
     if isinstance(state, tuple):
         wrong += [state[:-1], (*state, 1)]
     for other in [*others, *wrong]:

@@ -1,15 +1,12 @@
 """The ways by which a body gets round others, against trying one after the other."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 import pytest
 from shapely import box
 from tests.meshed_homes import home_of
 from tests.reference import giving_way as slow
 
-from fleet2d.kernels import I64, Breakpoints, Distances, Timelines, Yielder, next_stop
+from fleet2d.kernels import Breakpoints, Distances, Timelines, Yielder, next_stop
 
 SECOND = 10**6
 NEAR = 300
@@ -20,12 +17,12 @@ MESH = home_of([box(0, 0, 4096, 4096)]).mesh
 WAITS = np.array([1, 4])
 
 
-def breakpoints(rows: I64) -> Breakpoints:
+def breakpoints(rows):
     time, x, y, heading, away = np.ascontiguousarray(rows.T)
     return Breakpoints(time, x, y, heading, away.astype(np.uint8))
 
 
-def random_rows(random: np.random.Generator) -> I64:
+def random_rows(random):
     """A body that drives and stands, in a square of 4000 units."""
     times = np.sort(random.choice(END, 7, replace=False)) * SECOND
     points = random.integers(100, 4000, (7, 2))
@@ -34,14 +31,12 @@ def random_rows(random: np.random.Generator) -> I64:
     return np.column_stack([times, points, zeros, zeros])
 
 
-def kept(bodies: int) -> Distances:
+def kept(bodies):
     whole = np.ones((1, bodies), np.int64)
     return Distances(whole * 0, whole * NEAR, whole * 0, np.zeros((1, bodies), np.uint8))
 
 
-def straight(
-    time: int, x: int, y: int, heading: int, to_x: int, to_y: int, discs: I64
-) -> I64 | None:
+def straight(time, x, y, heading, to_x, to_y, discs):
     """Drive there at 1000 units a second, facing one way; the right border can't be reached."""
     if to_x > 3000:
         return None
@@ -49,13 +44,13 @@ def straight(
     return np.array([[time + takes, to_x, to_y, heading, 0]])
 
 
-def walk(now: list[int], place: list[int]) -> list[list[int]] | None:
+def walk(now, place):
     """The same, for the reference."""
     rows = straight(*now[:4], *place, NO_DISCS)
     return None if rows is None else rows.tolist()
 
 
-def scenes(count: int) -> Any:
+def scenes(count):
     """Timelines of three bodies with random tracks, and the rows of the first one."""
     random = np.random.default_rng(51)
     for _ in range(count):
@@ -67,7 +62,7 @@ def scenes(count: int) -> Any:
         yield random, timelines, tracks, step
 
 
-def free_in(timelines: Timelines, step: int) -> Any:
+def free_in(timelines, step):
     return lambda rows: timelines.meeting_on(0, breakpoints(rows), kept(3), step, END) == (-1, -1)
 
 
@@ -154,14 +149,14 @@ def test_a_body_that_stands_at_a_corner_stays_aside_as_no_way_leads_back():
     ]
 
 
-def random_rest(random: np.random.Generator) -> I64:
+def random_rest(random):
     """A track on which most moments are of stops, with turns at some of them; some end away."""
     rows = random_rows(random)
     rows[-1, 4] = random.integers(0, 4) == 0
     return rows
 
 
-def rests(random: np.random.Generator, count: int) -> Iterator[tuple[I64, Timelines, int, int]]:
+def rests(random, count):
     """Yield tracks of a body with many stops, its timelines, a step, and when it meets another."""
     for _ in range(count):
         rows = random_rest(random)

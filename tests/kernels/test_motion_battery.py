@@ -21,14 +21,14 @@ tracks = st.lists(rows, max_size=9)
 charges = st.floats(0, 1)
 
 
-def track_of(legs: list[tuple[int, int, int, int]]) -> Breakpoints:
+def track_of(legs):
     """Return a track of places and headings, each so many minutes after the last one."""
     minutes, x, y, heading = np.array(legs, np.int64).reshape(-1, 4).T.copy()
     time = np.cumsum(minutes) * MINUTE
     return Breakpoints(time - time[:1].sum(), x, y, heading, np.zeros(len(x), np.uint8))
 
 
-def battery(level: float, since: int = 0, *, is_broken: bool = False) -> BatteryState:
+def battery(level, since=0, *, is_broken=False):
     """Return a battery whose charger is at (0, 0)."""
     return BatteryState(level, since, DRIVING, STANDING, CHARGING, 0, 0, is_broken=is_broken)
 

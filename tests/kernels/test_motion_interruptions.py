@@ -1,7 +1,5 @@
 """Interruptions of a day: what is refused; `tests/routines/test_interruptions.py` has the twin."""
 
-from typing import Any
-
 import pytest
 
 from fleet2d.kernels import Interruptions, RoomUse, StepDraws
@@ -9,7 +7,7 @@ from fleet2d.kernels import Interruptions, RoomUse, StepDraws
 OFTEN = list(range(1, 257))
 
 
-def rules(**changes: Any) -> Interruptions:
+def rules(**changes):
     """Rules of three activities, with one need."""
     parts = {
         "steps": [(1, 1024, OFTEN)], "every": OFTEN, "asleep": None, "chances": (0, 0, 0, 0),

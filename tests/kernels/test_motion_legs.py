@@ -20,14 +20,14 @@ ROOM = shapely.box(0, 0, 3600, 3600) - shapely.box(1600, 1600, 2200, 2200)
 class InLists:
     """The slow, obvious twin of Legs: the state is the last row."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.rows = [[5_000_000, 100, 200, 7, 0]]
 
     @property
-    def now(self) -> list[int]:
+    def now(self):
         return self.rows[-1]
 
-    def turn(self, headings: int) -> None:
+    def turn(self, headings):
         left = abs(headings)
         while left > 0:
             part = min(left, TURN // 3)
@@ -36,12 +36,12 @@ class InLists:
             heading = (heading + (part if headings > 0 else -part)) % TURN
             self.rows.append([time + ceil(part * 1e6 / TURN_RATE), x, y, heading, away])
 
-    def settle(self, x: int, y: int, heading: int) -> None:
+    def settle(self, x, y, heading):
         if [x, y] != self.now[1:3]:
             self.walk(np.array([self.now[1:3], [x, y]]))
         self.turn(turn_between(self.now[3], heading))
 
-    def walk(self, route: np.ndarray) -> None:
+    def walk(self, route):
         timed = time_route(route, self.now[0], self.now[3], SPEED, TURN_RATE)
         self.rows += [[*row, 0] for row in timed[1:].tolist()]
 

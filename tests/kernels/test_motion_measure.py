@@ -40,7 +40,7 @@ rooms_by_step = st.integers(1, 40).flatmap(
 )
 
 
-def visits(rooms: list[int]) -> tuple[np.ndarray, np.ndarray]:
+def visits(rooms):
     """Where the room changes, and the room from there on."""
     begin = [i for i, room in enumerate(rooms) if i == 0 or room != rooms[i - 1]]
     return np.array(begin, np.int64), np.array([rooms[i] for i in begin], np.int16)

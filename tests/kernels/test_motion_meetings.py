@@ -3,7 +3,7 @@
 import copy
 
 import numpy as np
-from tests.reference.meetings import Way, first_meeting
+from tests.reference.meetings import first_meeting
 from tests.thorough import examples
 
 from fleet2d.kernels import Breakpoints, Distances, Timelines
@@ -13,22 +13,22 @@ STEPS = 30
 NEAR = 400
 
 
-def random_track(random: np.random.Generator, size: int) -> tuple[Breakpoints, Way]:
+def random_track(random, size):
     """A track of a few legs and rests between whole steps, and where it is at a moment."""
     times = np.sort(random.choice(STEPS, 6, replace=False)).astype(np.int64)
     points = random.integers(0, size, (6, 2))
     points[2] = points[1]
     zeros = np.zeros(6, np.int64)
     track = Breakpoints(times * SECOND, points[:, 0], points[:, 1], zeros, zeros.astype(np.uint8))
-    return track, lambda t: tuple(float(np.interp(t, times, points[:, k])) for k in (0, 1))  # type: ignore[return-value]
+    return track, lambda t: tuple(float(np.interp(t, times, points[:, k])) for k in (0, 1))
 
 
-def distances(rows: int, lead: int = 0, counts: int = 0) -> Distances:
+def distances(rows, lead=0, counts=0):
     whole = np.ones((rows, 2), np.int64)
     return Distances(whole * lead, whole * NEAR, whole * 0, np.full((rows, 2), counts, np.uint8))
 
 
-def follow(tracks: list[Breakpoints]) -> Timelines:
+def follow(tracks):
     timelines = Timelines(len(tracks), SECOND)
     for row, track in enumerate(tracks):
         timelines.follow(row, 0, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
@@ -109,6 +109,6 @@ def test_what_was_found_before_is_not_said_of_other_ways_times_or_distances():
     assert met > 100
 
 
-def distances_of_three(random: np.random.Generator) -> Distances:
+def distances_of_three(random):
     lead, near, hard = (random.integers(0, most, (3, 3)) for most in (6, 600, 500))
     return Distances(lead - 1, near, hard, random.integers(0, 3, (3, 3)).astype(np.uint8))

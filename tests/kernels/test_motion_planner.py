@@ -1,7 +1,6 @@
 """The planner of days: what is refused; `tests/routines/test_planner.py` has the twin."""
 
 import pickle
-from typing import Any
 
 import pytest
 
@@ -13,7 +12,7 @@ JOB = (2, None, LAW, 80_000, [], 1_000_000, True, -1)
 PASTIME = (3, 1, LAW, 0, 90_000)
 
 
-def plan(**changes: Any) -> DayPlanner:
+def plan(**changes):
     """A plan with a job and a pastime."""
     parts = {"sleep": ([80_000], 80_000, 80_000, 0, 0), "least": 3600} | changes
     jobs, pastimes = parts.get("jobs", [JOB]), parts.get("pastimes", [PASTIME])

@@ -1,7 +1,6 @@
 """What people do in a home, against the same leg by leg, and what is refused."""
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,9 +25,9 @@ HOMES = {
 
 
 @cache
-def person(home: str, body: str) -> tuple[Any, Any]:
+def person(home, body):
     """A person in a home, or a robot that moves as a person does not, and its routine."""
-    users: dict[str, Any] = {"ana": {"type": "routine", "persona": "retired"}}
+    users = {"ana": {"type": "routine", "persona": "retired"}}
     robot = {"type": "routine", "persona": "retired", "drive": {"type": "trapezoidal"}}
     content = scenario("1 d", users=users, robots={"astro": robot}, **HOMES[home])
     actor = fleet2d.Simulation(content).actors[body]
@@ -36,7 +35,7 @@ def person(home: str, body: str) -> tuple[Any, Any]:
 
 
 @st.composite
-def venue_of(draw: st.DrawFn, spots: Any, rooms: list[Any], kinds: list[str]) -> Venue:
+def venue_of(draw, spots, rooms, kinds):
     """A venue with any rooms, furniture, moves and stores."""
     own = draw(st.lists(st.sampled_from(rooms), max_size=3, unique=True))
     activity = Activity(
@@ -96,17 +95,17 @@ VENUE = (None, 0, False, 0, 0, [0], [], [1], [(1, WAITS)], LAW)
 class Room:
     """A home of one room, and a seat."""
 
-    def __init__(self, **answers: Any) -> None:
-        self.answers: dict[str, Any] = {
+    def __init__(self, **answers):
+        self.answers = {
             "spots": [(5, 5)], "seats": [0], "seat": (9, 9, 0, 1, 8, 8), "nearest": 0,
             "room_at": 0, "wait": 0, "way_out": (1, 1),
         } | answers  # fmt: skip
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return lambda *_: self.answers[name]
 
 
-def live(home: Any = None, scene: CoreVenue | None = None, **changes: Any) -> Any:
+def live(home=None, scene=None, **changes):
     """Do an activity where no route is known."""
     stint = {"number": 0, "end": 1000, "role": 0, "stays": False} | changes
     now = changes.get("now", (0, 0, 0, 0, 0))
@@ -127,17 +126,15 @@ def test_what_is_asked_for_is_used():
 class Rooms(Room):
     """A home of rooms with a spot each."""
 
-    def spots(self, room: int) -> list[tuple[int, int]]:
+    def spots(self, room):
         return [(5 + room, 5)]
 
 
-def walks_of(
-    stints: list[tuple[CoreVenue, int, int, int, bool]], **answers: Any
-) -> list[tuple[int, int]]:
+def walks_of(stints, **answers):
     """Return the spots to which somebody walks, 7 us each, who does activities from 0 on."""
     spots = []
 
-    def walk(course: Any, place: tuple[int, int, int]) -> Any:
+    def walk(course, place):
         spots.append(place[1:])
         return (course[0][0] + 7, *place[1:], 0, 0), 0
 
@@ -226,7 +223,7 @@ def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known():
     live(last=last)
     before = last.__getstate__()
 
-    def no_way(*_: Any) -> Any:
+    def no_way(*_):
         raise KeyError("no way")
 
     with pytest.raises(KeyError, match="no way"):

@@ -11,7 +11,6 @@ from tests.reference import signals as slow
 from fleet2d.kernels import (
     Breakpoints,
     Timelines,
-    Window,
     distances_between,
     distances_to_shape,
     sliding_max,
@@ -29,7 +28,7 @@ values = st.lists(value, min_size=1, max_size=14)
 Track = list[tuple[int, int, int, bool]]
 
 
-def timelines_of(tracks: list[Track]) -> Timelines:
+def timelines_of(tracks):
     result = Timelines(len(tracks), STEP_US)
     for body, legs in enumerate(tracks):
         time = np.cumsum([0, *(leg[0] for leg in legs[1:])]) * STEP_US
@@ -41,19 +40,19 @@ def timelines_of(tracks: list[Track]) -> Timelines:
     return result
 
 
-def poses_of(window: Window, body: int) -> list[slow.Pose]:
+def poses_of(window, body):
     x, y, _, away, _ = window.dense(body, window.first, window.end)
     rows = zip(x.tolist(), y.tolist(), away.tolist(), strict=True)
     return [(x, y, bool(away)) for x, y, away in rows]
 
 
-def dense(stretches: tuple[np.ndarray, np.ndarray], end: int = STEPS) -> list[float]:
+def dense(stretches, end=STEPS):
     start, numbers = stretches
     assert (numbers[1:] != numbers[:-1]).all(), "neighbours differ"
     return np.repeat(numbers, np.diff(np.append(start, end))).tolist()
 
 
-def stretches(numbers: list[float]) -> tuple[np.ndarray, np.ndarray]:
+def stretches(numbers):
     array = np.array(numbers)
     is_first = np.append(True, array[1:] != array[:-1])
     return np.flatnonzero(is_first), array[is_first]

@@ -5,10 +5,8 @@ import gc
 import pickle
 import sys
 from bisect import bisect_right
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +14,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
-from tests.meshed_homes import Home, home_of
+from tests.meshed_homes import home_of
 from tests.reference import motion as slow
 from tests.strategies import quick
 
@@ -35,12 +33,10 @@ INSIDE = home_of([shapely.box(100, 100, 1180, 860).difference(shapely.box(400, 2
 class Twin:
     """Poses of one body at every step, up to the horizon."""
 
-    def __init__(self) -> None:
-        self.poses: dict[int, Pose] = {}
+    def __init__(self):
+        self.poses = {}
 
-    def follow(
-        self, step: int, track: list[slow.Row], posture_us: list[int], postures: list[int]
-    ) -> None:
+    def follow(self, step, track, posture_us, postures):
         self._go_on(
             step,
             lambda s: (
@@ -49,24 +45,24 @@ class Twin:
             ),
         )
 
-    def walk(self, step: int, walls: Home, space: Home, rule: WalkRule, start: Any) -> None:
+    def walk(self, step, walls, space, rule, start):
         key, stride, sway, limit = (int(part) for part in rule[:4])
         steps = slow.walk(walls.walls, space.walls, key, stride, sway, limit, start, step)
         poses = dict(enumerate(islice(steps, HORIZON - step), step))
         self._go_on(step, lambda s: (*poses[s], 0, 0))
 
-    def _go_on(self, step: int, pose_at: Callable[[int], Pose]) -> None:
+    def _go_on(self, step, pose_at):
         for s in range(step, HORIZON):
             self.poses[s] = pose_at(s)
 
 
-def breakpoints(track: list[slow.Row]) -> Breakpoints:
+def breakpoints(track):
     """Return a track as the kernel has it."""
     *columns, away = (np.array(column, np.int64) for column in zip(*track, strict=True))
     return Breakpoints(*columns, away.astype(np.uint8))
 
 
-def runs_of(window: Window, body: int) -> list[tuple[int, Pose]]:
+def runs_of(window, body):
     """Return the runs of a body: the step at which each begins, and its pose."""
     part = slice(*window.start[body : body + 2].tolist())
     columns = (window.step, window.x, window.y, window.heading, window.away, window.posture)
@@ -74,18 +70,18 @@ def runs_of(window: Window, body: int) -> list[tuple[int, Pose]]:
     return [(step, (x, y, heading, away, posture)) for step, x, y, heading, away, posture in rows]
 
 
-def dense(window: Window, body: int, first: int, end: int) -> list[Pose]:
+def dense(window, body, first, end):
     """Return the poses of a body at some steps."""
     columns = (column.tolist() for column in window.dense(body, first, end))
     return list(zip(*columns, strict=True))
 
 
-def joined(poses: list[Pose], first: int) -> list[tuple[int, Pose]]:
+def joined(poses, first):
     """Return the steps at which another pose is taken, and the poses."""
     return [(first + j, pose) for j, pose in enumerate(poses) if j == 0 or pose != poses[j - 1]]
 
 
-def check_window(window: Window, expected: list[list[Pose]], first: int, end: int) -> None:
+def check_window(window, expected, first, end):
     """Check that a window tells the poses of all bodies, in as few runs as there can be."""
     assert (first, end) == (window.first, window.end)
     assert len(expected) + 1 == len(window.start)
@@ -100,7 +96,7 @@ pauses = st.one_of(st.sampled_from([0, 0, 500, 1000, 5000, 20_000]), st.integers
 
 
 @st.composite
-def tracks(draw: st.DrawFn, around: int) -> list[slow.Row]:
+def tracks(draw, around):
     """Tracks that begin near a moment: jumps, halts, legs, turns, and being away."""
     time = around + draw(st.sampled_from([0, 0, -7000, -333, 500, 12_000]))
     x, y, heading, away = draw(st.integers(0, 900)), 400, draw(st.integers(0, 4095)), 0
@@ -116,7 +112,7 @@ def tracks(draw: st.DrawFn, around: int) -> list[slow.Row]:
 
 
 @st.composite
-def postures_from(draw: st.DrawFn, around: int) -> tuple[list[int], list[int]]:
+def postures_from(draw, around):
     """When another posture is taken, at or within steps, and which."""
     times = sorted(around + pause for pause in draw(st.lists(pauses, max_size=4)))
     codes = draw(st.lists(st.integers(0, 2), min_size=len(times) + 1, max_size=len(times) + 1))
@@ -127,7 +123,7 @@ class Moving(RuleBasedStateMachine):
     """Bodies that get plans at ever later steps, or others at the same; looked at anywhere."""
 
     @initialize(bodies=st.integers(1, 3), data=st.data())
-    def begin(self, bodies: int, data: st.DataObject) -> None:
+    def begin(self, bodies, data):
         self.now = self.known_from = 0
         self.timelines = Timelines(bodies, STEP_US)
         self.twins = [Twin() for _ in range(bodies)]
@@ -137,14 +133,14 @@ class Moving(RuleBasedStateMachine):
             else:
                 self._walk(body, data)
 
-    def _follow(self, body: int, data: st.DataObject) -> None:
+    def _follow(self, body, data):
         track = data.draw(tracks(self.now * STEP_US))
         times, codes = data.draw(postures_from(self.now * STEP_US))
         moments, postures = np.array(times, np.int64), np.array(codes, np.int8)
         self.timelines.follow(body, self.now, breakpoints(track), moments, postures)
         self.twins[body].follow(self.now, track, times, codes)
 
-    def _walk(self, body: int, data: st.DataObject) -> None:
+    def _walk(self, body, data):
         key, stride = (
             data.draw(st.integers(0, 2**64 - 1)),
             data.draw(st.sampled_from([700, 20_000])),
@@ -155,25 +151,25 @@ class Moving(RuleBasedStateMachine):
         self.twins[body].walk(self.now, ROOM, space, of, start)
 
     @rule(steps=st.integers(0, 9), at=st.integers(0, 2), data=st.data())
-    def follow(self, steps: int, at: int, data: st.DataObject) -> None:
+    def follow(self, steps, at, data):
         """Another plan, some steps later or at the same step."""
         self.now = min(self.now + steps, HORIZON - 2)
         self._follow(at % len(self.twins), data)
 
     @rule(steps=st.integers(0, 9), at=st.integers(0, 2), data=st.data())
-    def walk(self, steps: int, at: int, data: st.DataObject) -> None:
+    def walk(self, steps, at, data):
         self.now = min(self.now + steps, HORIZON - 2)
         self._walk(at % len(self.twins), data)
 
     @rule(back=st.integers(0, 5), at=st.integers(0, 2), data=st.data())
-    def follow_from_an_earlier_step_on(self, back: int, at: int, data: st.DataObject) -> None:
+    def follow_from_an_earlier_step_on(self, back, at, data):
         """As a script may, that lets a body do something else than was planned."""
         now, self.now = self.now, max(self.known_from, self.now - back)
         self._follow(at % len(self.twins), data)
         self.now = now
 
     @rule(data=st.data())
-    def look_at_a_window(self, data: st.DataObject) -> None:
+    def look_at_a_window(self, data):
         first = data.draw(st.integers(self.known_from, HORIZON - 1))
         end = data.draw(st.integers(first, HORIZON))
         expected = [[twin.poses[s] for s in range(first, end)] for twin in self.twins]
@@ -182,7 +178,7 @@ class Moving(RuleBasedStateMachine):
         check_window(self.timelines.runs(body, first, end), [expected[body]], first, end)
 
     @rule(data=st.data())
-    def look_at_a_step(self, data: st.DataObject) -> None:
+    def look_at_a_step(self, data):
         step = data.draw(st.integers(self.known_from, HORIZON - 1))
         expected = [twin.poses[step][:4] for twin in self.twins]
         assert expected == [self.timelines.pose(b, step) for b in range(len(self.twins))]
@@ -190,14 +186,14 @@ class Moving(RuleBasedStateMachine):
         assert poses == [[list(pose) for pose in expected]] * 2
 
     @rule(steps=st.integers(0, 20))
-    def forget(self, steps: int) -> None:
+    def forget(self, steps):
         """All before a step, not beyond the present one; what is left is as before."""
         before = min(self.known_from + steps, self.now)
         self.timelines.forget(before)
         self.known_from = before
 
     @rule(how=st.sampled_from(["pickle", "deepcopy", "copy of a copy"]))
-    def go_on_with_a_copy(self, how: str) -> None:
+    def go_on_with_a_copy(self, how):
         if how == "pickle":
             self.timelines = pickle.loads(pickle.dumps(self.timelines))
         elif how == "deepcopy":
@@ -207,7 +203,7 @@ class Moving(RuleBasedStateMachine):
             self.timelines = pickle.loads(pickle.dumps(pickle.loads(state)))
 
     @invariant()
-    def the_present_pose_is_known(self) -> None:
+    def the_present_pose_is_known(self):
         if hasattr(self, "twins"):
             for body, twin in enumerate(self.twins):
                 assert twin.poses[self.now][:4] == self.timelines.pose(body, self.now)
@@ -237,7 +233,7 @@ def test_a_window_of_given_poses_joins_equal_ones(data, bodies, steps, first):
         assert poses[0][begin:end] == dense(window, 0, first + begin, first + end)
 
 
-def resting(bodies: int = 1) -> Timelines:
+def resting(bodies=1):
     """Return bodies that rest at (5, 6)."""
     timelines = Timelines(bodies, STEP_US)
     for body in range(bodies):
@@ -290,10 +286,10 @@ def test_threads_may_ask_for_the_same_walk_at_once():
     """It is drawn on as it is asked for: two threads that did that at once crashed."""
     walker = WalkRule(np.uint64(5), 9000, 40_000, 500)
 
-    def ask(timelines: Timelines) -> list[int]:
+    def ask(timelines):
         return [len(timelines.window(s, s + 3000).step) for s in range(0, 60_000, 977)]
 
-    def walking() -> Timelines:
+    def walking():
         timelines = Timelines(1, STEP_US)
         timelines.walk(0, 0, ROOM.mesh, INSIDE.mesh, walker, (221, 333, 77))
         return timelines
@@ -322,7 +318,7 @@ def test_meshes_are_freed_with_their_walks():
     timelines, rule_ = resting(2), WalkRule(np.uint64(5), 9000, 40_000, 500)
     meshes = [home_of([shapely.box(0, 0, 1280, 900 + 2 * i)]).mesh for i in range(4)]
 
-    def reference_counts() -> list[int]:
+    def reference_counts():
         return [sys.getrefcount(mesh) for mesh in meshes]
 
     free = reference_counts()
@@ -348,7 +344,7 @@ def test_copies_are_independent():
     assert [(5, 6, 7, 0), (50, 60, 70, 1)] == [timelines.pose(0, 4), twin.pose(0, 4)]
 
 
-def follow(**changes: Any) -> Callable[[Timelines], None]:
+def follow(**changes):
     arguments = {
         "body": 0,
         "step": 0,
@@ -359,7 +355,7 @@ def follow(**changes: Any) -> Callable[[Timelines], None]:
     return lambda timelines: timelines.follow(**arguments)
 
 
-def walk(**changes: Any) -> Callable[[Timelines], None]:
+def walk(**changes):
     arguments = {
         "body": 0,
         "step": 0,
@@ -470,7 +466,7 @@ def test_states_that_no_window_has_are_refused(changes, message):
     }  # fmt: skip
     types = [int, int, np.int64, np.int64, *POSE_TYPES]
 
-    def read(parts: dict[str, Any]) -> Window:
+    def read(parts):
         window = Window.__new__(Window)
         values = (
             v if t is int else np.array(v, t) for v, t in zip(parts.values(), types, strict=True)

@@ -9,13 +9,12 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.meshed_homes import Home, home_of, houseexpo
+from tests.meshed_homes import home_of, houseexpo
 from tests.reference import motion as slow
 from tests.reference.line_of_sight import is_inside, touches_any_wall
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import (
-    I64,
     TURN,
     Breakpoints,
     Poses,
@@ -28,18 +27,18 @@ from fleet2d.kernels import (
 DAY_US = 86_400_000_000
 
 
-def poses(count: int) -> Poses:
+def poses(count):
     """Return room for poses, filled with what no pose is."""
     x, y, heading = (np.full(count, -7, np.int64) for _ in range(3))
     return Poses(x, y, heading, np.full(count, 9, np.uint8))
 
 
-def rows_of(out: Poses) -> list[slow.Pose]:
+def rows_of(out):
     """Return the poses as tuples."""
     return list(zip(*(array.tolist() for array in out), strict=True))
 
 
-def traced(track: list[slow.Row], begin: int, step: int, count: int) -> list[slow.Pose]:
+def traced(track, begin, step, count):
     """Return the poses that the kernel finds."""
     time, x, y, heading, away = (np.array(column, np.int64) for column in zip(*track, strict=True))
     out = poses(count)
@@ -47,13 +46,13 @@ def traced(track: list[slow.Row], begin: int, step: int, count: int) -> list[slo
     return rows_of(out)
 
 
-def twin(track: list[slow.Row], begin: int, step: int, count: int) -> list[slow.Pose]:
+def twin(track, begin, step, count):
     """Return the poses that the twin finds."""
     return [slow.pose_at(track, begin + i * step) for i in range(count)]
 
 
 @st.composite
-def tracks(draw: st.DrawFn) -> list[slow.Row]:
+def tracks(draw):
     """Tracks with breakpoints at equal times, halts, turns across 0 and half turns."""
     time, x, y, heading, away = draw(st.integers(0, 50)), 500, 700, draw(st.integers(0, 4095)), 0
     track = [(time, x, y, heading, away)]
@@ -175,7 +174,7 @@ def test_trace_track_refuses_invalid_input(track, step, message):
         trace_track(track, 0, step, poses(4))
 
 
-def timed(route: list[tuple[int, int]], speed: float, rate: float, heading: int = 0) -> I64:
+def timed(route, speed, rate, heading=0):
     """Return the breakpoints of a route that begins at 1 s."""
     return time_route(np.array(route, np.int64), 1_000_000, heading, speed, rate)
 
@@ -258,7 +257,7 @@ def test_endless_time_route_ends_at_the_last_possible_time():
 # --- The random walk ---
 
 
-def walked(walls: Home, space: Home, rule: WalkRule, first: int, start: I64, count: int) -> I64:
+def walked(walls, space, rule, first, start, count):
     """Return the poses of a walk: int64 (count, 3)."""
     out = poses(count)
     trace_meander(walls.mesh, space.mesh, rule, first, tuple(start.tolist()), out)
@@ -266,7 +265,7 @@ def walked(walls: Home, space: Home, rule: WalkRule, first: int, start: I64, cou
     return np.stack(out[:3], axis=1)
 
 
-def shrunk(home: Home, reach: int) -> Home | None:
+def shrunk(home, reach):
     """Return the home as a body that reaches so far on all sides has it; None if it has none."""
     outside = shapely.box(-500, -500, 20_000, 20_000).difference(shapely.union_all(home.polygons))
     grown = [
@@ -278,7 +277,7 @@ def shrunk(home: Home, reach: int) -> Home | None:
     return home_of(parts) if parts else None
 
 
-def inner_points(home: Home, rng: np.random.Generator, count: int) -> I64:
+def inner_points(home, rng, count):
     """Return points strictly inside: int64 (n, 2)."""
     tried = rng.integers(0, [64 * home.columns, 64 * home.rows], (40 * count, 2))
     inside = tried[is_inside(home.walls, tried)]
@@ -286,7 +285,7 @@ def inner_points(home: Home, rng: np.random.Generator, count: int) -> I64:
     return np.asarray(inside[:count][off_wall], np.int64)
 
 
-def check_walk(space: Home, steps: I64, rule: WalkRule) -> int:
+def check_walk(space, steps, rule):
     """Check that no step leaves the space, crosses a wall, turns or strides too far."""
     moves = np.diff(steps[:, :2], axis=0)
     moved = np.flatnonzero(moves.any(axis=1))

@@ -1,12 +1,9 @@
 """Arrays as bytes: equal to those of the slow twin, and read back to the last bit."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from tests.reference import encoding as slow
 
 from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
@@ -17,19 +14,19 @@ INT64 = [-(2**63), -1, 0, 1, 254, 255, 256, 2**16, 2**32, 2**63 - 1]
 STEPS = RNG.integers(0, 5, 1000).cumsum()
 
 
-def read_back(arrays: list[NDArray[Any]]) -> list[NDArray[Any]]:
+def read_back(arrays):
     reader = ArrayReader(encode_arrays(arrays))
     return [reader.read(values.dtype, len(values)) for values in arrays]
 
 
-def is_same(one: NDArray[Any], other: NDArray[Any]) -> bool:
+def is_same(one, other):
     return one.dtype == other.dtype and one.tobytes() == other.tobytes()
 
 
 @st.composite
-def columns(draw: st.DrawFn) -> list[NDArray[Any]]:
+def columns(draw):
     """Arrays of any type and of any behaviour: few values, many, rising, at the limits."""
-    arrays: list[NDArray[Any]] = []
+    arrays = []
     for _ in range(draw(st.integers(0, 4))):
         count = draw(st.sampled_from([0, 1, 2, 3, 7, 63, 64, 65, 66, 129, 300]))
         rng = np.random.default_rng(draw(st.integers(0, 2**32)))

@@ -7,9 +7,6 @@ import pytest
 
 from fleet2d.algorithms.presence.belief import with_anyone
 from fleet2d.kernels import (
-    F64,
-    I64,
-    Bool,
     PeoplePlaces,
     gather_views,
     sum_places,
@@ -17,7 +14,7 @@ from fleet2d.kernels import (
 )
 
 
-def views(seed: int, robots: int) -> tuple[I64, ...]:
+def views(seed, robots):
     """Return cells in view of some robots, many bins alike, and the patches that they are of."""
     random = np.random.default_rng(seed)
     room = np.repeat(np.arange(5), random.integers(1, 4, 5))
@@ -82,20 +79,20 @@ def test_patches_with_an_unknown_person_are_not_watched(seed, users):
     assert len(views) == view[-1] + 1
 
 
-def values(chains: F64, unknown: Bool, users: int) -> F64:
+def values(chains, unknown, users):
     """Return what adds up of each bin, as an estimator in NumPy has it."""
     rows = with_anyone(list(chains), unknown) if users else chains[0][:, None]
     return np.concatenate([rows, rows * (1 - rows), np.ones((*rows.shape[:2], 1))], axis=2)
 
 
-def together(stretches: list[tuple[F64, I64]]) -> PeoplePlaces:
+def together(stretches):
     """Return the stretches of people one after the other."""
     places, bins = (np.concatenate(parts) for parts in zip(*stretches, strict=True))
     begin = np.cumsum([0, *(len(lengths) for _, lengths in stretches)])
     return PeoplePlaces(places, bins, begin)
 
 
-def chain_of(random: np.random.Generator, bins: int) -> tuple[F64, I64]:
+def chain_of(random, bins):
     """Return probabilities of places in stretches of up to five bins, and their lengths."""
     cuts = np.cumsum(random.integers(1, 6, bins))
     lengths = np.diff([0, *cuts[cuts < bins], bins])

@@ -1,7 +1,5 @@
 """The stays of people who are followed side by side, against products of matrices one by one."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -22,20 +20,20 @@ from fleet2d.kernels import (
 BINS = 6
 
 
-def by_bin(places: PeoplePlaces, person: int) -> Any:
+def by_bin(places, person):
     """Return the probability of one person's places in each bin: float64 (bins, rooms + 1)."""
     own = slice(places.begin[person], places.begin[person + 1])
     return np.repeat(places.probability[own], places.bins[own], axis=0)
 
 
-def models(seed: int, stages: int, people: int) -> StayModel:
+def models(seed, stages, people):
     """People in the same rooms, of whom each has other habits."""
     each = [case(seed * 100 + number, stages, 1, 1, SIZES).model for number in range(people)]
     columns = (np.stack(column) for column in list(zip(*each, strict=True))[:4])
     return StayModel(*columns, each[0].first, each[0].detection)
 
 
-def evidence(seed: int, people: int) -> DayEvidence:
+def evidence(seed, people):
     """Bins with views that change, in which some people are perceived in one patch or in two."""
     random = np.random.default_rng(seed)
     views = random.choice([0, 0, 60, 255], (3, PATCHES)).astype(np.uint8)
@@ -48,7 +46,7 @@ def evidence(seed: int, people: int) -> DayEvidence:
     return DayEvidence(np.arange(BINS), view, views, person, bin_, patch, steps)
 
 
-def states(random: np.random.Generator, people: int, stages: int) -> Any:
+def states(random, people, stages):
     values = random.random((people, stages, PATCHES))
     return values / values.sum(axis=(1, 2), keepdims=True)
 

@@ -16,7 +16,7 @@ sightings = st.lists(
 )
 
 
-def empty() -> RoomMemory:
+def empty():
     """Return a memory without sightings."""
     shape = PEOPLE + 2, ROOMS
     return RoomMemory(
@@ -24,7 +24,7 @@ def empty() -> RoomMemory:
     )
 
 
-def remembered(seen: list[slow.Sighting]) -> RoomMemory:
+def remembered(seen):
     """Return a memory of sightings."""
     memory, rows = empty(), np.array(seen, np.int64).reshape(-1, 3)
     step, distinct, index = rows[:, 0].copy(), *np.unique(rows[:, 1:], axis=0, return_inverse=True)

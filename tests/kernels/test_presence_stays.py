@@ -29,7 +29,7 @@ class Case(NamedTuple):
     seen: Any
 
 
-def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...] = SIZES) -> Case:
+def case(seed, stages, count, longest, sizes=SIZES):
     random = np.random.default_rng(seed)
     places, patches = len(sizes), sum(sizes)
     nodes = places * stages
@@ -62,24 +62,24 @@ def case(seed: int, stages: int, count: int, longest: int, sizes: tuple[int, ...
     return Case(model, stretches, now / now.sum(), before.astype(np.int64), seen)
 
 
-def no_moments(model: StayModel) -> Moments:
+def no_moments(model):
     (nodes, columns), patches = model.follow.shape, len(model.spread)
     rooms = np.zeros(columns - 1), np.zeros(columns - 1)
     return Moments(np.zeros(nodes), np.zeros((nodes, columns)), np.zeros(patches), *rooms)
 
 
-def by_state(now: Any) -> Any:
+def by_state(now):
     """The order of the twin: stage, patch, in view or not."""
     return np.moveaxis(now, 0, -1).ravel()
 
 
-def by_place(states: Any, stages: int) -> Any:
+def by_place(states, stages):
     """Sums of the twin's states by room."""
     by_patch = states.reshape(len(states), stages, PATCHES, 2).sum(axis=(1, 3))
     return np.array([np.bincount(ROOM, row, PLACES) for row in by_patch])
 
 
-def twin(of: Case) -> Any:
+def twin(of):
     model, stretches = of.model, of.stretches
     return slow.stays(
         model,
@@ -135,7 +135,7 @@ def test_stays_are_the_same_to_the_last_bit_on_every_machine(stages, digest):
     assert digest == hashlib.sha256(places).hexdigest()
 
 
-def portable(of: Case) -> Case:
+def portable(of):
     """Round what NumPy draws by logarithms, which differ in the last bit between machines."""
     model, stretches, now, shown, seen = of
     model = StayModel(

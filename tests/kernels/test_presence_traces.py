@@ -15,14 +15,12 @@ from fleet2d.kernels import (
 )
 
 
-def rooms_of(random: np.random.Generator, count: int) -> TracedRooms:
+def rooms_of(random, count):
     at = random.uniform(0, 12, (count, 2))
     return TracedRooms(random.dirichlet(np.ones(count)), np.abs(at[:, None] - at).sum(axis=2) / 10)
 
 
-def evidence_of(
-    random: np.random.Generator, bins: int, rooms: int, first: int, put_back: int = 0
-) -> TracedEvidence:
+def evidence_of(random, bins, rooms, first, put_back=0):
     minute = first + np.arange(bins) * 37  # more than a day
     minute[bins // 2 :] -= put_back  # as a clock is, in the middle
     watched = random.random((bins, rooms)) * (random.random((bins, rooms)) < 0.5)

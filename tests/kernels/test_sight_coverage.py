@@ -7,19 +7,17 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.meshed_homes import Home, home_of
+from tests.meshed_homes import home_of
 from tests.reference import visible_cells as slow
 from tests.strategies import quick, seeds
 
 from fleet2d._core import camera_pose
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import (
-    I16,
     I64,
     NEVER,
     CoverageRecord,
     CoverageSetup,
-    Lenses,
     Poses,
     Window,
     empty_pose_cache,
@@ -52,7 +50,7 @@ class Seen(NamedTuple):
     most: list[list[int]]
 
 
-def lenses_of(*cameras: Camera) -> Lenses:
+def lenses_of(*cameras):
     """Return cameras as the kernel has them, with 64 lattice units to 5 cm."""
     lenses = [camera.lens(1280, SECOND) for camera in cameras]
     lattice = Lattice(0.05, (0.0, 0.0), FLAT.columns, FLAT.rows)
@@ -61,7 +59,7 @@ def lenses_of(*cameras: Camera) -> Lenses:
     )
 
 
-def rooms_of(home: Home) -> I16:
+def rooms_of(home):
     """Return three rooms: strips of columns, with cells of no room between."""
     rooms = np.full((home.rows, home.columns), -1, np.int16)
     for room in range(ROOMS):
@@ -70,7 +68,7 @@ def rooms_of(home: Home) -> I16:
     return rooms
 
 
-def random_poses(rng: np.random.Generator, count: int) -> Poses:
+def random_poses(rng, count):
     """Return poses of a robot that stands, comes back to a few places, and is away at times."""
     cells = FLAT.cells
     spots = rng.choice(cells, 6) + rng.integers(-30, 30, (6, 2))
@@ -83,13 +81,13 @@ def random_poses(rng: np.random.Generator, count: int) -> Poses:
     )  # fmt: skip
 
 
-def window_of(poses: Poses, first: int = 0, bodies: int = 1, body: int = 0) -> Window:
+def window_of(poses, first=0, bodies=1, body=0):
     """Return how one of several bodies moves; the others are where it is in another step."""
     columns = [np.stack([np.roll(column, b - body) for b in range(bodies)]) for column in poses]
     return Window(first, *columns, np.zeros(columns[0].shape, np.int8))
 
 
-def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
+def by_brute_force(poses, lenses, every):
     """Return what is seen, step by step and cell by cell."""
     shape = (FLAT.rows, FLAT.columns)
     first, last = np.full(shape, NEVER), np.full(shape, NEVER)
@@ -117,13 +115,13 @@ def by_brute_force(poses: Poses, lenses: Lenses, every: int) -> Seen:
 
 
 def by_kernel(
-    poses: Poses,
-    lenses: Lenses,
-    every: int,
-    slots: int,
-    ends: list[int],
-    body: int | None = None,
-) -> Seen:
+    poses,
+    lenses,
+    every,
+    slots,
+    ends,
+    body=None,
+):
     """Return what the kernel makes of it, in spans that end at the given steps.
 
     Each span has a window of its own, or all have one in which the robot is one of three bodies.

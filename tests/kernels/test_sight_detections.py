@@ -1,15 +1,15 @@
 """What a camera sees, against a twin that looks at every wall and at sixty digits of a cosine."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.meshed_homes import Home, home_of
+from tests.meshed_homes import home_of
 from tests.reference import detections as slow
 from tests.reference.random import key_of_word
 from tests.strategies import homes, quick, seeds
@@ -26,9 +26,7 @@ from fleet2d.kernels import (
     USER_SEEN,
     About,
     DetectionRule,
-    ErrorTables,
     Heights,
-    Lenses,
     SightMemory,
     UserDraw,
     Window,
@@ -77,14 +75,14 @@ class Scene:
     thickness: int = 0
     heights: int = 0
 
-    def part(self, begin: int, end: int) -> "Scene":
+    def part(self, begin, end):
         """Return some steps of it."""
         shown = None if self.shown is None else self.shown[..., begin:end]
         return replace(
             self, robot=self.robot[begin:end], users=self.users[:, begin:end], shown=shown
         )
 
-    def window(self, first: int) -> tuple[Window, int, int]:
+    def window(self, first):
         """Return how all bodies move, the number of the robot, and that of the first user."""
         robot = self.robot[None][..., [0, 1, 3, 2]]
         robot = np.concatenate([robot, np.zeros_like(robot[..., :1])], axis=2)
@@ -99,12 +97,12 @@ class Scene:
             return window, one, 2 * one + 1
         return window, 2 * one + other, one
 
-    def radii(self) -> I64 | None:
+    def radii(self):
         """Return the radii of all bodies of the window, None if they don't hide each other."""
         count = len(self.users) + 1 + 3 * self.strangers
         return self.thickness + 7 * np.arange(count) if self.thickness else None
 
-    def obstacles(self) -> dict[int, slow.Obstacle] | None:
+    def obstacles(self):
         """Return the obstacles that hide users, for the reference."""
         radii = self.radii()
         if radii is None:
@@ -124,7 +122,7 @@ class Scene:
                 result[-1 - number] = slow.Obstacle(here, radius)
         return result
 
-    def heights_for(self, eyes: Sequence[slow.Eye]) -> tuple[Heights, slow.Heights] | None:
+    def heights_for(self, eyes):
         """Return the heights of cameras, bodies and furniture, for the kernel and for the twin."""
         if not self.heights:
             return None
@@ -157,7 +155,7 @@ class Scene:
         return levels, slow.Heights(levels.eyes.tolist(), levels.points.tolist(), tops, pieces)
 
 
-def _piece(rng: np.random.Generator) -> slow.Piece:
+def _piece(rng):
     """Return a piece of furniture: a box on cells' borders, an L, or a triangle."""
     x, y, w, h = (64 * rng.integers(0, 12, 4) + [0, 0, 32, 32]).tolist()
     shapes = [
@@ -188,27 +186,27 @@ class Seen(NamedTuple):
     seen: list[int]
 
     @property
-    def places(self) -> list[tuple[int, ...]]:
+    def places(self):
         """Sightings by step, camera, user, x and y."""
         return [(step, camera, user, x, y) for step, camera, user, _, x, y, *_ in self.sightings]
 
 
-def half_angle(degrees: float) -> int:
+def half_angle(degrees):
     """Return the half of a field of view as a lens has it."""
     return round(degrees / 360 * 4096)
 
 
-def lattice() -> Lattice:
+def lattice():
     """Return a lattice whose units are those of the homes here."""
     return Lattice(cell=0.05, origin=(0.0, 0.0), columns=20, rows=20)
 
 
-def listed(eye: slow.Eye | Sequence[slow.Eye]) -> list[slow.Eye]:
+def listed(eye):
     """Return one camera, or several, as a list."""
     return [eye] if isinstance(eye, slow.Eye) else list(eye)
 
 
-def tables_of(eyes: Sequence[slow.Eye], scene: Scene) -> ErrorTables:
+def tables_of(eyes, scene):
     """Return how cameras err, with a stream for each draw."""
     perceptions = list(scene.perceptions) or [None] * len(eyes)
     count = len(scene.users)
@@ -223,9 +221,7 @@ def tables_of(eyes: Sequence[slow.Eye], scene: Scene) -> ErrorTables:
     return errors
 
 
-def kernel_args(
-    eyes: Sequence[slow.Eye], scene: Scene
-) -> tuple[Lenses, ErrorTables, DetectionRule]:
+def kernel_args(eyes, scene):
     """Return cameras as the kernel wants them."""
     lenses = [Lens(**eye._asdict()) for eye in eyes]
     count = len(scene.users)
@@ -238,7 +234,7 @@ def kernel_args(
     return stack_lenses(lenses, errs, about), errors, rule
 
 
-def nothing_known(eye: slow.Eye | Sequence[slow.Eye], scene: Scene) -> Carried:
+def nothing_known(eye, scene):
     """Return what a robot carries that has seen nobody."""
     eyes, count, errors = listed(eye), len(scene.users), tables_of(listed(eye), scene)
     bursts = count + MAX_GHOSTS * errors.has_ghosts
@@ -255,13 +251,13 @@ def nothing_known(eye: slow.Eye | Sequence[slow.Eye], scene: Scene) -> Carried:
 
 
 def looked(
-    home: Home,
-    eye: slow.Eye | Sequence[slow.Eye],
-    scene: Scene,
-    first: int,
-    stops: tuple[bool, bool] = (False, False),
-    carried: Carried | None = None,
-) -> Seen:
+    home,
+    eye,
+    scene,
+    first,
+    stops=(False, False),
+    carried=None,
+):
     """Return what the kernel sees."""
     eyes = listed(eye)
     memory = (carried or nothing_known(eyes, scene)).memory
@@ -296,13 +292,13 @@ def looked(
 
 
 def looked_slowly(
-    home: Home,
-    eye: slow.Eye | Sequence[slow.Eye],
-    scene: Scene,
-    first: int,
-    stops: tuple[bool, bool] = (False, False),
-    carried: Carried | None = None,
-) -> Seen:
+    home,
+    eye,
+    scene,
+    first,
+    stops=(False, False),
+    carried=None,
+):
     """Return what the twin sees."""
     eyes, carried = listed(eye), carried or nothing_known(eye, scene)
     shown, heights = scene.shown, scene.heights_for(eyes)
@@ -329,15 +325,13 @@ def looked_slowly(
     return Seen(*result, [k.noticed for k in known], [int(k.seen) for k in known])
 
 
-def rested(rng: np.random.Generator, poses: I64, moves: float) -> I64:
+def rested(rng, poses, moves):
     """Return poses (steps, …) of which each lasts: another one comes with a probability."""
     steps = np.arange(len(poses))
     return poses[np.maximum.accumulate(np.where(rng.random(len(poses)) < moves, steps, 0))]
 
 
-def scene_in(
-    home: Home, rng: np.random.Generator, count: int, steps: int = STEPS, moves: float = 1.0
-) -> Scene:
+def scene_in(home, rng, count, steps=STEPS, moves=1.0):
     """Return a scene where much goes on: bodies at one point, on borders, on walls, away.
 
     Bodies take another pose with the probability `moves`, each for itself.
@@ -370,7 +364,7 @@ def scene_in(
 
 
 @st.composite
-def eyes(draw: st.DrawFn) -> slow.Eye:
+def eyes(draw):
     """Cameras of all kinds."""
     near = draw(st.sampled_from([0, 0, 1, 100]))
     return slow.Eye(
@@ -383,7 +377,7 @@ def eyes(draw: st.DrawFn) -> slow.Eye:
 
 
 @st.composite
-def odd_eyes(draw: st.DrawFn) -> slow.Eye:
+def odd_eyes(draw):
     """Cameras mounted anywhere, that pan, wait and lag, and look at whole bodies."""
     headings = st.sampled_from([*EIGHTHS, 1, 300, 4000])
     return draw(eyes())._replace(
@@ -412,14 +406,14 @@ NOISE = {
 
 
 @st.composite
-def perceptions(draw: st.DrawFn, period: int, users: int) -> Perception:
+def perceptions(draw, period, users):
     """Ways to err of a camera with a period [steps]: misses, mistakes, noise, false positives."""
-    detection: dict[str, Any] = dict(draw(st.sampled_from([{}, CURVES, {"distance": 0.6}])))
+    detection = dict(draw(st.sampled_from([{}, CURVES, {"distance": 0.6}])))
     detection["memory"] = draw(st.sampled_from(["0 s", "2 s", "10 s"]))
-    identity: dict[str, Any] = {"per_track": draw(st.booleans())}
+    identity = {"per_track": draw(st.booleans())}
     if draw(st.booleans()):
         identity |= {"right": [[0, 0.7], [0.5, 0.3]], "mistaken": 0.25}
-    false: Mapping[str, Any] = {}
+    false = {}
     if draw(st.booleans()):
         most = 3600 / period  # one in each look
         places = st.tuples(*[st.integers(2, 14).map(lambda cells: cells * 0.05)] * 2)
@@ -442,18 +436,18 @@ def perceptions(draw: st.DrawFn, period: int, users: int) -> Perception:
 
 
 @st.composite
-def errors_of(draw: st.DrawFn, cameras: Sequence[slow.Eye], users: int) -> list[Perception | None]:
+def errors_of(draw, cameras, users):
     """Ways to err of several cameras, of which some don't."""
     return [draw(st.one_of(st.none(), perceptions(eye.period, users))) for eye in cameras]
 
 
 def assert_same(
-    home: Home,
-    eye: slow.Eye | Sequence[slow.Eye],
-    scene: Scene,
-    first: int,
-    stops: tuple[bool, bool] = (False, False),
-) -> Seen:
+    home,
+    eye,
+    scene,
+    first,
+    stops=(False, False),
+):
     """Compare what the kernel and its twin see, and return it."""
     expected = looked_slowly(home, eye, scene, first, stops)
     assert expected == looked(home, eye, scene, first, stops)
@@ -734,7 +728,7 @@ def test_look_at_another_user_leaves_the_draws_of_the_first_alone():
     assert of_both == [(s, x, y) for s, _, _, x, y in looked(home, eye, second, 0).places]
 
 
-def line_of(users: list[tuple[int, int]], steps: int = 1, heading: int = 0) -> Scene:
+def line_of(users, steps=1, heading=0):
     """Return a robot at (501, 501) that looks at users who stand still."""
     robot = np.tile([501, 501, heading, 0], (steps, 1))
     still = [[[501 + dx, 501 + dy, 0, 0, 0]] * steps for dx, dy in users]
@@ -814,7 +808,7 @@ def test_in_wedge_of_every_direction_equals_cosines(half):
             assert slow.in_wedge(heading, half, dx, dy) == in_wedge(heading, half, dx, dy)
 
 
-def _sine(part: int) -> object:
+def _sine(part):
     return slow.cosine(part - 2048)
 
 

@@ -11,14 +11,14 @@ from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
 from tests.strategies import quick
 
 from fleet2d._core import camera_pose, hides, in_wedge, near_wedge, points_in_view
-from fleet2d.kernels import Lenses, camera_poses
+from fleet2d.kernels import camera_poses
 from fleet2d.sight.camera import Camera, stack_lenses
 
 MIDDLE = round(SIDE_M / 2 * UNITS_PER_M)
 OFFSET = st.integers(-4000, 4000)
 
 
-def lenses(**camera: object) -> Lenses:
+def lenses(**camera):
     """Return one camera."""
     lens = Camera.model_validate(camera).lens(UNITS_PER_M, 10**6)
     return stack_lenses([lens], [False], scene())

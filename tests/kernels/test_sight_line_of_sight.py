@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 from tests.meshed_homes import (
-    Home,
     all_homes,
     awkward_points,
     behind_corners,
@@ -23,9 +22,6 @@ from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import build_fans, vertices_seen_from_point, vertices_seen_from_vertex
 from fleet2d.kernels import (
-    I64,
-    Bool,
-    Mesh,
     line_of_sight,
     locate,
     nearest_cells_in_sight,
@@ -35,22 +31,22 @@ from fleet2d.kernels import (
 EYES, POINTS = 2, 24
 
 
-def _sees_each(mesh: Mesh, eye: I64, points: I64) -> Bool:
+def _sees_each(mesh, eye, points):
     """Return which points the eye sees."""
     return pairs_in_sight(mesh, np.broadcast_to(eye, points.shape), points)
 
 
-def _is_seen_by_each(mesh: Mesh, eye: I64, points: I64) -> Bool:
+def _is_seen_by_each(mesh, eye, points):
     """Return which points see the eye."""
     return pairs_in_sight(mesh, points, np.broadcast_to(eye, points.shape))
 
 
-def sees(home: Home, eye: tuple[int, int], point: tuple[int, int]) -> bool:
+def sees(home, eye, point):
     """Return one verdict."""
     return bool(line_of_sight(home.mesh, *eye, locate(home.mesh, *eye), *point))
 
 
-def check_against_every_wall(home: Home, mesh: Mesh, rng: np.random.Generator) -> int:
+def check_against_every_wall(home, mesh, rng):
     """Compare verdicts from awkward eyes to awkward points, both ways; return how many are seen."""
     count = 0
     for eye in awkward_points(home, rng, EYES):

@@ -11,7 +11,7 @@ from tests.strategies import quick
 
 import fleet2d.kernels as k
 from fleet2d import _core
-from fleet2d.kernels import I64, heading_of
+from fleet2d.kernels import heading_of
 from fleet2d.sight.camera import Camera, error_tables
 from fleet2d.sight.perception import Perception
 
@@ -19,7 +19,7 @@ KEY = np.uint64(12345)
 VECTOR = st.tuples(st.integers(-9000, 9000), st.integers(-9000, 9000))
 
 
-def table_of(**perception: object) -> I64:
+def table_of(**perception):
     """Return the table of one camera that sees as far as 10 m."""
     lens = Camera(range=(0.0, 10.0)).lens(1280, 10**6)
     return error_tables([lens], [Perception.model_validate(perception)], scene()).table

@@ -10,9 +10,6 @@ from tests.reference.line_of_sight import visible
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import (
-    F64,
-    I64,
-    Mesh,
     Reach,
     best_view,
     half_sine,
@@ -24,13 +21,13 @@ from fleet2d.kernels import (
 HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
 
 
-def in_reach(x: int, y: int, heading: int, reach: Reach, px: int, py: int) -> bool:
+def in_reach(x, y, heading, reach, px, py):
     """Return the verdict on one point, in plain Python integers."""
     dx, dy = px - x, py - y
     if not reach.near_squared <= dx * dx + dy * dy <= reach.far_squared:
         return False
 
-    def side(half: int) -> int:
+    def side(half):
         """Positive: left of a direction [1/8192 of a turn]."""
         along, up = int(half_sine(half + 2048)), int(half_sine(half))
         return along * dy - up * dx
@@ -82,11 +79,9 @@ def test_points_in_sight_are_those_that_no_wall_hides_in_real_homes(shared_data)
 HALVES_OF_EIGHT = np.array([(1, 0), (0.7, 0.7), (0, 1), (-0.7, 0.7)])
 
 
-def best_by_counting(
-    mesh: Mesh, places: I64, points: I64, far: float, cosine: float
-) -> tuple[int, int] | None:
+def best_by_counting(mesh, places, points, far, cosine):
     """Return what `best_view` does, by the counts at all places and in all directions."""
-    directions: F64 = np.concatenate([HALVES_OF_EIGHT, -HALVES_OF_EIGHT])
+    directions = np.concatenate([HALVES_OF_EIGHT, -HALVES_OF_EIGHT])
     counts = []
     for x, y in places.tolist():
         x_gaps, y_gaps = (points - (x, y)).T.astype(np.float64)
@@ -130,7 +125,7 @@ def test_points_that_are_none_are_refused(points):
         points_in_reach(5, 5, 0, Reach(0, 100, 1), points)
 
 
-def near(points: I64, line: I64, reach: float) -> list[bool]:
+def near(points, line, reach):
     """Return which points are near a line, by shapely."""
     return (shapely.distance(shapely.points(points), shapely.LineString(line)) < reach).tolist()
 

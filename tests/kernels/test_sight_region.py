@@ -8,7 +8,6 @@ import shapely
 from hypothesis import given
 from shapely.geometry import Polygon
 from tests.meshed_homes import (
-    Home,
     all_homes,
     awkward_points,
     behind_corners,
@@ -21,9 +20,6 @@ from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import region_contains
 from fleet2d.kernels import (
-    F64,
-    I32,
-    Mesh,
     points_in_sight,
     rasterize_cells,
     region_contains_points,
@@ -36,7 +32,7 @@ from fleet2d.kernels import (
 ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300, 700, 400))])
 
 
-def canonical(mesh: Mesh, right: I32, wall: I32) -> list[tuple[int, int, int]]:
+def canonical(mesh, right, wall):
     """Return the pieces by vertices only: on the right border, and at both ends of the wall."""
     corners = mesh.triangles[wall // 3]
     starts = np.take_along_axis(corners, wall[:, None] % 3, 1)[:, 0]
@@ -44,13 +40,13 @@ def canonical(mesh: Mesh, right: I32, wall: I32) -> list[tuple[int, int, int]]:
     return list(zip(right.tolist(), starts.tolist(), ends.tolist(), strict=True))
 
 
-def area_of(mesh: Mesh, x: int, y: int) -> tuple[float, F64]:
+def area_of(mesh, x, y):
     """Return the area of a region, and the corners of its outline."""
     outline, area = region_outline(mesh, x, y, *visible_region(mesh, x, y))
     return area, outline
 
 
-def check_verdicts(home: Home, mesh: Mesh, rng: np.random.Generator, eyes: int, count: int) -> None:
+def check_verdicts(home, mesh, rng, eyes, count):
     """Compare regions with lines of sight."""
     for eye in awkward_points(home, rng, eyes):
         around = [
@@ -154,7 +150,7 @@ def test_no_eye_in_a_wall_has_a_region():
         assert not region_contains(ROOM.mesh, x, y, right, wall, x, y)
 
 
-def check_regions_of_cells(home: Home, step: int) -> float:
+def check_regions_of_cells(home, step):
     """Compare regions with those found one by one; return the mean number of pieces."""
     cell_triangles = rasterize_cells(home.mesh, home.rows, home.columns)
     cells = np.ascontiguousarray(np.argwhere(cell_triangles >= 0)[::step])

@@ -5,7 +5,6 @@ import pytest
 import shapely
 from hypothesis import given
 from tests.meshed_homes import (
-    Home,
     all_homes,
     awkward_points,
     home_of,
@@ -17,8 +16,6 @@ from tests.reference import visible_cells as slow
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import (
-    Bool,
-    Mesh,
     Reach,
     cells_in_view,
     half_sine,
@@ -33,7 +30,7 @@ HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
 ROOM = home_of([shapely.box(128, 128, 1280, 640).difference(shapely.box(500, 300, 700, 400))])
 
 
-def mask_in_view(home: Home, mesh: Mesh, pose: tuple[int, int, int], reach: Reach) -> Bool:
+def mask_in_view(home, mesh, pose, reach):
     """Return the mask of the cells in view; no cell may be in two spans."""
     spans = cells_in_view(mesh, *pose, reach, home.rows, home.columns)
     mask = np.zeros((home.rows, home.columns), np.bool_)
@@ -42,7 +39,7 @@ def mask_in_view(home: Home, mesh: Mesh, pose: tuple[int, int, int], reach: Reac
     return mask
 
 
-def by_lines(home: Home, pose: tuple[int, int, int], reach: Reach) -> Bool:
+def by_lines(home, pose, reach):
     """Return the mask of the cells in view, each by its own line of sight."""
     centres = np.indices((home.rows, home.columns))[::-1].reshape(2, -1).T * 64 + 33
     mask = points_in_reach(*pose, reach, centres)
@@ -50,14 +47,14 @@ def by_lines(home: Home, pose: tuple[int, int, int], reach: Reach) -> Bool:
     return mask.reshape(home.rows, home.columns)
 
 
-def random_reach(rng: np.random.Generator) -> tuple[int, int, int]:
+def random_reach(rng):
     """Return near, far [lattice] and half angle, the odd ones often."""
     near = int(rng.choice([0, 0, 1, 64, 200, 500]))
     far = near + int(rng.choice([1, 64, 500, 1500, 6000, 200_000]))
     return near, far, int(rng.choice([*HALVES, rng.integers(1, 4097)]))
 
 
-def random_pose(home: Home, rng: np.random.Generator) -> tuple[int, int, int]:
+def random_pose(home, rng):
     """Return a pose at one of the awkward points, looking along an eighth of a turn or anywhere."""
     x, y = rng.choice(awkward_points(home, rng, 3)).tolist()
     heading = rng.integers(0, 8) * 512 if rng.random() < 0.5 else rng.integers(0, 4096)

@@ -6,8 +6,6 @@ from tests.reference.chambers import nearest_labels
 
 from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.kernels import (
-    I32,
-    Bool,
     fill_from_neighbors,
     label_frames,
     line_of_sight,
@@ -18,7 +16,7 @@ from fleet2d.kernels import (
 
 
 @st.composite
-def labelled(draw: st.DrawFn) -> tuple[I32, Bool]:
+def labelled(draw):
     """Draw labels and a mask; some labels are outside the mask."""
     rows, columns = draw(st.integers(1, 9)), draw(st.integers(1, 9))
     cells = st.lists(st.integers(-6, 4), min_size=rows * columns, max_size=rows * columns)

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from tests.reference import furniture as slow
 from tests.strategies import quick
 
-from fleet2d.kernels import Bool, GroupRule, RoomFloor, corner_sums, group_places
+from fleet2d.kernels import GroupRule, RoomFloor, corner_sums, group_places
 
 SHAPES = [(1, 1), (1, 6), (6, 1), (4, 4), (5, 9)]
 SMALL = GroupRule(width=2, depth=1, front=1, backed=0, corner=40, away=20, far=3)
 
 
-def floor_of(shape: tuple[int, int], share: float, seed: int) -> tuple[RoomFloor, Bool]:
+def floor_of(shape, share, seed):
     """Return a random room, most of whose cells are free by a share, and what occupies it."""
     rng = np.random.default_rng(seed)
     whole = rng.random(shape) < share

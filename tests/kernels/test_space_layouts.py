@@ -8,8 +8,6 @@ from tests.reference import layouts as slow
 from tests.strategies import quick
 
 from fleet2d.kernels import (
-    F64,
-    I64,
     CorridorRule,
     Divisions,
     is_promising,
@@ -24,11 +22,11 @@ ROOMS = 12
 LIMITS = np.array([(24.0, 3.0)] * ROOMS)
 
 
-def areas_of(seed: int) -> F64:
+def areas_of(seed):
     return np.random.default_rng(seed).uniform(900, 9000, ROOMS)
 
 
-def add_tree(rng: np.random.Generator, depth: int, nodes: list[tuple[int, int]]) -> None:
+def add_tree(rng, depth, nodes):
     if depth == 0 or rng.random() < 0.3:
         nodes.append((int(rng.integers(ROOMS)), int(rng.choice([37, 63, 100]))))
         return
@@ -38,9 +36,9 @@ def add_tree(rng: np.random.Generator, depth: int, nodes: list[tuple[int, int]])
         add_tree(rng, depth - 1, nodes)
 
 
-def trees_of(seed: int) -> Divisions:
+def trees_of(seed):
     rng = np.random.default_rng(seed)
-    nodes: list[tuple[int, int]] = []
+    nodes = []
     starts = []
     for _ in range(int(rng.integers(1, 6))):
         starts.append(len(nodes))
@@ -48,7 +46,7 @@ def trees_of(seed: int) -> Divisions:
     return Divisions(np.array(nodes, np.int64), np.array(starts, np.int64))
 
 
-def slots_of(seed: int, bays: bool) -> I64:
+def slots_of(seed, bays):
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 6))
     rooms = rng.permutation(10)[: 2 * count].reshape(2, count)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import shapely
 
-from fleet2d.kernels import I32, Bool, count_steps, label_parts, trace_rings
+from fleet2d.kernels import count_steps, label_parts, trace_rings
 
 SHAPES = [(1, 1), (1, 9), (9, 1), (2, 2), (6, 7), (14, 11)]
 SHARES = [0.0, 0.2, 0.5, 0.6, 0.9, 1.0]
 
 
-def masks(shape: tuple[int, int], share: float, count: int = 10) -> list[Bool]:
+def masks(shape, share, count=10):
     rng = np.random.default_rng([*shape, int(100 * share)])
     return [rng.random(shape) < share for _ in range(count)]
 
@@ -18,13 +18,13 @@ def masks(shape: tuple[int, int], share: float, count: int = 10) -> list[Bool]:
 # --- Slow, obvious twins ------------------------------------------------------------------------
 
 
-def near(row: int, column: int, diagonal: bool) -> list[tuple[int, int]]:
+def near(row, column, diagonal):
     sides = [(row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)]
     corners = [(row + a, column + b) for a in (-1, 1) for b in (-1, 1)]
     return sides + corners if diagonal else sides
 
 
-def slow_label_parts(mask: Bool, diagonal: bool) -> I32:
+def slow_label_parts(mask, diagonal):
     """Let every pixel take the lowest number around it until nothing changes."""
     pixels = [(int(r), int(c)) for r, c in np.argwhere(mask)]
     number = {pixel: k for k, pixel in enumerate(pixels)}
@@ -42,7 +42,7 @@ def slow_label_parts(mask: Bool, diagonal: bool) -> I32:
     return out
 
 
-def slow_count_steps(start: Bool, mask: Bool) -> I32:
+def slow_count_steps(start, mask):
     """Walk one step further from all that is reached, again and again."""
     out = np.where(start & mask, 0, -1).astype(np.int32)
     for step in range(1, mask.size + 1):
@@ -52,14 +52,14 @@ def slow_count_steps(start: Bool, mask: Bool) -> I32:
     return out
 
 
-def rings_of(mask: Bool) -> list[I32]:
+def rings_of(mask):
     corners, starts = trace_rings(mask)
     return [corners[a:b] for a, b in pairwise(starts.tolist())]
 
 
-def unit_sides(rings: list[I32]) -> list[tuple[int, ...]]:
+def unit_sides(rings):
     """Cut rings into directed sides of one pixel."""
-    sides: list[tuple[int, ...]] = []
+    sides = []
     for ring in rings:
         for (x0, y0), (x1, y1) in zip(ring.tolist(), np.roll(ring, -1, 0).tolist(), strict=True):
             dx, dy = np.sign(x1 - x0), np.sign(y1 - y0)
@@ -72,7 +72,7 @@ def unit_sides(rings: list[I32]) -> list[tuple[int, ...]]:
     return sides
 
 
-def slow_sides(mask: Bool) -> set[tuple[int, ...]]:
+def slow_sides(mask):
     """Go round every pixel, and drop what two pixels share."""
     sides = set()
     for y, x in np.argwhere(mask).tolist():

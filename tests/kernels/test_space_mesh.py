@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 from tests.meshed_homes import (
-    Home,
     all_homes,
     awkward_points,
     home_of,
@@ -27,7 +26,7 @@ def test_orient_is_the_doubled_signed_area(point, expected):
     assert expected == orient(0, 0, 4, 0, *point)
 
 
-def lowest_triangle(home: Home, x: int, y: int) -> int:
+def lowest_triangle(home, x, y):
     """Return what `locate` should find, by a look at every triangle."""
     for triangle, corners in enumerate(home.mesh.triangles.tolist()):
         ends = [home.mesh.vertices[corner].tolist() for corner in corners]

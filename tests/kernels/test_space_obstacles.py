@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 from tests.reference import obstacles as slow
 from tests.strategies import homes, quick
 
-from fleet2d.kernels import I64, add_obstacles, wall_obstacles
+from fleet2d.kernels import add_obstacles, wall_obstacles
 
 coordinate = st.integers(0, 24).map(lambda n: 32 * n)
 box = st.tuples(coordinate, coordinate, coordinate, coordinate).map(
@@ -18,12 +18,12 @@ box = st.tuples(coordinate, coordinate, coordinate, coordinate).map(
 octagons = st.sampled_from([(2, 2), (16, 6), (64, 26), (100, 0)])
 
 
-def rings_of(polygons: list[Polygon]) -> tuple[I64, I64]:
+def rings_of(polygons):
     corners, ring_of = shapely.get_coordinates(shapely.get_rings(polygons), return_index=True)
     return corners.astype(np.int64), ring_of.astype(np.int64)
 
 
-def corners_of(box: tuple[int, int, int, int]) -> list[tuple[int, int]]:
+def corners_of(box):
     x0, y0, x1, y1 = box
     return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given
-from tests.meshed_homes import Home, home_of, shuffled
+from tests.meshed_homes import home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import distance
-from fleet2d.kernels import I64, Corners, Routes
+from fleet2d.kernels import Corners, Routes
 
 
-def corners_of(home: Home) -> Corners:
+def corners_of(home):
     """Return the nodes of a route graph: reflex corners, and vertices where several walls meet."""
     into = {tuple(v): [] for v in home.mesh.vertices.tolist()}
     out_of = {tuple(v): [] for v in home.mesh.vertices.tolist()}
@@ -42,17 +42,17 @@ def corners_of(home: Home) -> Corners:
     )
 
 
-def routes_of(home: Home) -> Routes:
+def routes_of(home):
     """Return the corners of a home and the legs between them."""
     return Routes(home.mesh, corners_of(home))
 
 
-def legs_of(routes: Routes) -> list[I64]:
+def legs_of(routes):
     """Return all legs, as arrays that can be compared."""
     return [routes.leg_start, routes.leg_end, routes.leg_length]
 
 
-def some_points(home: Home, rng: np.random.Generator, count: int) -> I64:
+def some_points(home, rng, count):
     """Return points inside: centres of cells, and points in line with corners."""
     region = region_of(home.mesh.vertices, home.mesh.triangles)
     anywhere = rng.integers(0, [64 * home.columns, 64 * home.rows], (20 * count, 2))
@@ -63,7 +63,7 @@ def some_points(home: Home, rng: np.random.Generator, count: int) -> I64:
     return np.asarray(tried[inside][:count], np.int64)
 
 
-def check_routes(home: Home, rng: np.random.Generator, count: int) -> tuple[int, int]:
+def check_routes(home, rng, count):
     """Compare paths between random points with the twin; return how many bend and how many fail."""
     vertices = home.mesh.vertices
     region, routes = region_of(vertices, home.mesh.triangles), routes_of(home)
@@ -108,7 +108,7 @@ def test_find_route_does_not_depend_on_the_mesh(polygons, seed):
         assert path is None or np.array_equal(path, same)
 
 
-def crowded(seed: int) -> Home:
+def crowded(seed):
     """Return a hall full of slanted pillars."""
     rng = np.random.default_rng(seed)
     pillars = []

@@ -4,10 +4,8 @@ import copy
 import io
 import pickle
 import random
-from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,19 +24,19 @@ ODD = [0, 1, -1, 2, 7, 2**15, 2**29, -(2**29), 2**31 - 1, 2**40, 2**62, -(2**63)
 class _Finder(pickle.Pickler):
     """Collects the objects of the core in a state."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__(io.BytesIO(), 5)
-        self.objects: dict[str, Any] = {}
+        self.objects = {}
 
-    def persistent_id(self, obj: Any) -> Any:
+    def persistent_id(self, obj):
         kind = type(obj)
         if kind.__module__ == "fleet2d._core" and kind.__name__ in KINDS:
             self.objects.setdefault(kind.__name__, obj)
-        return None
+        return
 
 
 @cache
-def originals() -> dict[str, Any]:
+def originals():
     """An object of each class, of a run with tracks and random walks."""
     home = scenario("1 h", users={"ana": {"type": "meander"}}, robots={"astro": {"type": "patrol"}})
     run = fleet2d.Simulation(home)
@@ -57,7 +55,7 @@ def originals() -> dict[str, Any]:
     return objects
 
 
-def arrays_in(state: Any, where: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int, ...], Any]]:
+def arrays_in(state, where=()):
     """Yield all places in a state, and what is there."""
     if isinstance(state, tuple | list):
         for index, entry in enumerate(state):
@@ -65,7 +63,7 @@ def arrays_in(state: Any, where: tuple[int, ...] = ()) -> Iterator[tuple[tuple[i
             yield from arrays_in(entry, (*where, index))
 
 
-def with_value(state: Any, where: tuple[int, ...], value: Any) -> Any:
+def with_value(state, where, value):
     """A state with another value at a place."""
     if not where:
         return value
@@ -74,7 +72,7 @@ def with_value(state: Any, where: tuple[int, ...], value: Any) -> Any:
     return type(state)(entries)
 
 
-def changed(value: Any, rng: random.Random) -> Any:
+def changed(value, rng):
     """Something else, in place of a part of a state."""
     if isinstance(value, np.ndarray):
         value = value.copy()
@@ -100,7 +98,7 @@ def changed(value: Any, rng: random.Random) -> Any:
     return rng.choice([None, (), [], value, 3, "x", (value,), [value, value]])
 
 
-def use(thing: Any) -> None:
+def use(thing):
     """Do with an object what a run does with it."""
     kind = type(thing).__name__
     if kind == "Timelines":

@@ -1,9 +1,7 @@
 """The charge of a battery along a track, rate by rate, in slow and obvious Python."""
 
-from fleet2d.kernels import BatteryState, Breakpoints
 
-
-def rates_of(track: Breakpoints, battery: BatteryState) -> list[tuple[int, float]]:
+def rates_of(track, battery):
     """Return the moments [us] from that of the battery on at which its rate changes, and the rates."""
     columns = (column.tolist() for column in (track.time, track.x, track.y, track.heading))
     rows = list(zip(*columns, strict=True))
@@ -22,7 +20,7 @@ def rates_of(track: Breakpoints, battery: BatteryState) -> list[tuple[int, float
     return pieces
 
 
-def levels_of(track: Breakpoints, battery: BatteryState) -> list[tuple[int, float, float]]:
+def levels_of(track, battery):
     """Return when the rate changes, the charge then, and the rate."""
     pieces, level = [], battery.level
     begins = rates_of(track, battery)
@@ -33,14 +31,14 @@ def levels_of(track: Breakpoints, battery: BatteryState) -> list[tuple[int, floa
     return pieces
 
 
-def charge_at(track: Breakpoints, battery: BatteryState, moment: int) -> float:
+def charge_at(track, battery, moment):
     """Return the charge at a moment."""
     pieces = levels_of(track, battery)
     begin, level, rate = [piece for piece in pieces if piece[0] <= moment][-1]
     return min(1.0, max(0.0, level + rate * (moment - begin)))
 
 
-def falls_to(track: Breakpoints, battery: BatteryState, level: float) -> int | None:
+def falls_to(track, battery, level):
     """Return the first moment at which the charge is at a level or below."""
     pieces = levels_of(track, battery)
     for (begin, charge, rate), (end, *_) in zip(pieces, [*pieces[1:], (None,)], strict=True):

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from fleet2d.kernels import I32, Bool
 
-
-def nearest_labels(labels: I32, mask: Bool) -> I32:
+def nearest_labels(labels, mask):
     """Grow all labels by one step across sides at a time; the lowest wins."""
     out = np.where(mask, labels, -1).astype(np.int32)
     rows, columns = labels.shape

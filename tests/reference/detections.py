@@ -1,7 +1,7 @@
 """A slow, obvious twin of the look kernel: cosines to sixty digits, and a look at every wall."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -16,7 +16,6 @@ from tests.reference.random import random_bell, random_below, random_bits
 
 import fleet2d.kernels as k
 from fleet2d import _core
-from fleet2d.kernels import I64
 
 Point = tuple[int, int]
 LOST, SEEN = 0, 1
@@ -90,31 +89,31 @@ class Heights:
     tops: dict[int, list[int]]
     furniture: list[Piece]
 
-    def base(self, body: Body) -> int:
+    def base(self, body):
         """Return how high a body lies, as who lies on furniture is on top of it."""
         here = shapely.Point(body.x, body.y)
         on = [p.top for p in self.furniture if shapely.Polygon(p.corners).covers(here)]
         return max(on, default=0) if body.posture == 2 else 0
 
-    def line(self, camera: int, user: int, point: int, owner: Body, body: Body) -> tuple[int, int]:
+    def line(self, camera, user, point, owner, body):
         """Return the heights of a camera and of a point of a user."""
         to = self.base(body) + self.points[camera][user][body.posture][point]
         return self.base(owner) + self.eyes[camera][owner.posture], to
 
 
-def line_is_low(eye: Fraction, to: Fraction, part: Fraction, top: int) -> bool:
+def line_is_low(eye, to, part, top):
     """Return whether a line from a height to another is at a part of its way at a top or below."""
     return eye + part * (to - eye) <= top
 
 
-def _furniture_hides(heights: Heights, at: Body, point: Point, eye: int, to: int) -> bool:
+def _furniture_hides(heights, at, point, eye, to):
     """Return whether the line meets an edge of a piece, and is not above it there."""
     px, py = point[0] - at.x, point[1] - at.y
     for piece in heights.furniture:
         corners = [(x - at.x, y - at.y) for x, y in piece.corners]
         for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
             across = px * (by - ay) - py * (bx - ax)
-            ends: list[Point] = [(ax, ay), (bx, by)]
+            ends = [(ax, ay), (bx, by)]
             parts = []
             if across != 0:
                 part = Fraction(ax * (by - ay) - ay * (bx - ax), across)
@@ -140,7 +139,7 @@ class Ghost(NamedTuple):
     identity: int
 
 
-def in_wedge(heading: int, half_angle: int, dx: int, dy: int) -> bool:
+def in_wedge(heading, half_angle, dx, dy):
     """Return whether the angle between (dx, dy) and the heading is at most `half_angle`.
 
     The angle is at most half a turn, so its cosine decides. A border runs right through a lattice
@@ -159,7 +158,7 @@ def in_wedge(heading: int, half_angle: int, dx: int, dy: int) -> bool:
     return margin > 0
 
 
-def offset(forward: int, left: int, heading: int) -> tuple[int, int]:
+def offset(forward, left, heading):
     """Return a place in the robot's frame in that of the home, by sines of 30 binary digits."""
     along, up = (round(f(2 * heading) * 2**30) for f in (cosine, sine))
     half = Fraction(1, 2)
@@ -169,7 +168,7 @@ def offset(forward: int, left: int, heading: int) -> tuple[int, int]:
     )
 
 
-def pose_of(eye: Eye, robot: Body, moment_us: int) -> tuple[Body, int]:
+def pose_of(eye, robot, moment_us):
     """Return where a camera is, and where it looks."""
     dx, dy = offset(eye.forward, eye.left, robot.heading)
     turn = eye.pans[moment_us // eye.pan_us % len(eye.pans)] if eye.pans else 0
@@ -177,7 +176,7 @@ def pose_of(eye: Eye, robot: Body, moment_us: int) -> tuple[Body, int]:
     return Body(robot.x + dx, robot.y + dy, robot.away), heading
 
 
-def body_points(eye: Eye, radius: int) -> list[tuple[int, int]]:
+def body_points(eye, radius):
     """Return the points of a body that are looked at, from its centre."""
     around = [round(i * 4096 / eye.points) for i in range(eye.points)]
     return [(0, 0), *(offset(radius, 0, heading) for heading in around)]
@@ -195,24 +194,24 @@ class Errors:
     camera: int
     start_us: int = 0
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         users = self.tables.keys.shape[1]
         self.keys = self.tables.keys[self.camera].tolist()
         self.ghost_keys = self.tables.ghost_keys[self.camera].tolist()
         self.row = self.tables.table[self.camera].tolist()
-        self.draws: list[tuple[int, int] | None] = [None] * users  # step and value of the last one
-        self.tracks: list[tuple[int, int] | None] = [None] * users  # last step, and taken for whom
+        self.draws = [None] * users  # step and value of the last one
+        self.tracks = [None] * users  # last step, and taken for whom
 
-    def _share(self, user: int, purpose: int, step: int) -> int:
+    def _share(self, user, purpose, step):
         return random_bits(self.keys[user][purpose], step) // 2**33
 
-    def _noise(self, key: int, counter: int, noise: int) -> int:
+    def _noise(self, key, counter, noise):
         return half_up(Fraction(random_bell(key, counter) * noise, 2**16))
 
     def notices(
-        self, u: int, now: int, step_us: int, heading: int, away: tuple[int, int], user: Body,
-        shown: int, chance: int,
-    ) -> bool:  # fmt: skip
+        self, u, now, step_us, heading, away, user,
+        shown, chance,
+    ):  # fmt: skip
         """Return whether a user who is `away` from the camera is noticed."""
         last, value = self.draws[u], 0
         lasts = False
@@ -230,7 +229,7 @@ class Errors:
         )
         return value < _core.notice_chance(steady, self.row[k.TablePart.LIGHT + minute], chance)
 
-    def taken_for(self, u: int, now: int, away: tuple[int, int], patience: int) -> int:
+    def taken_for(self, u, now, away, patience):
         """Return for whom a noticed user is taken; -1 for nobody known."""
         before = self.tracks[u]
         if before is not None and self.row[k.TablePart.KEEPS] == 1 and now - before[0] < patience:
@@ -251,7 +250,7 @@ class Errors:
         self.tracks[u] = now, identity
         return identity
 
-    def perceived(self, u: int, now: int, away: tuple[int, int], user: Body) -> tuple[int, ...]:
+    def perceived(self, u, now, away, user):
         """Return x and y beside where the user is, heading and posture, as perceived."""
         table, c = self.tables.table, self.camera
         dx, dy = _core.perceived_offset(table, self.tables.keys, c, u, now, *away)
@@ -263,7 +262,7 @@ class Errors:
         )
         return dx - away[0], dy - away[1], (user.heading + turn) % 4096, posture
 
-    def ghosts(self, walls: I64, eye: Eye, at: Body, heading: int, now: int) -> list[Ghost]:
+    def ghosts(self, walls, eye, at, heading, now):
         """Return the false positives of a look."""
         if not self.tables.has_ghosts[self.camera]:
             return []
@@ -284,9 +283,7 @@ class Errors:
             found.append(Ghost(*place, faces, who if who < len(self.keys) else -1))
         return found
 
-    def _place(
-        self, walls: I64, eye: Eye, at: Body, heading: int, source: int, key: int
-    ) -> tuple[int, int] | None:
+    def _place(self, walls, eye, at, heading, source, key):
         """Return where a false positive of a source appears, if it does."""
         here = np.array([at.x, at.y])
         if source > 0:
@@ -310,7 +307,7 @@ class Errors:
         return None
 
 
-def _outcome(sums: list[int], draw: int) -> int:
+def _outcome(sums, draw):
     return next((i for i, end in enumerate(sums) if draw < end), len(sums))
 
 
@@ -327,21 +324,21 @@ class Look(NamedTuple):
 
 
 def detect(
-    walls: I64,
-    eyes: list[Eye],
-    robot: list[Body],
-    users: list[list[Body]],
-    radii: list[int],
-    keys: list[list[int]],
-    step_us: int,
-    first: int,
-    known: list[Known],
-    stops: tuple[bool, bool],
-    errors: Sequence[Errors | None] = (),
-    method: Method | None = None,
-    obstacles: Mapping[int, Obstacle] | None = None,
-    heights: Heights | None = None,
-) -> Look:
+    walls,
+    eyes,
+    robot,
+    users,
+    radii,
+    keys,
+    step_us,
+    first,
+    known,
+    stops,
+    errors=(),
+    method=None,
+    obstacles=None,
+    heights=None,
+):
     """Look at all users in each step, and tell what becomes known.
 
     Args:
@@ -360,9 +357,9 @@ def detect(
         obstacles: The users by number, and others by negative ones, that hide each other.
         heights: How high all are; None if that doesn't matter.
     """
-    sightings: list[tuple[int, ...]] = []
-    events: list[tuple[int, int, int]] = []
-    waiting: list[tuple[int, ...]] = []
+    sightings = []
+    events = []
+    waiting = []
     counts = [[[0, 0] for _ in users] for _ in eyes]
     patience = max(eye.patience for eye in eyes)
     for j, body in enumerate(robot):
@@ -421,11 +418,11 @@ def detect(
     return Look(len(robot), sightings, events, counts)
 
 
-def _in_range(eye: Eye, dx: int, dy: int) -> bool:
+def _in_range(eye, dx, dy):
     return eye.near**2 <= dx * dx + dy * dy <= eye.far**2
 
 
-def hides(point: Point, centre: Point, radius: int) -> bool:
+def hides(point, centre, radius):
     """Return whether the line from (0, 0) to a point passes a centre within a radius, between its ends."""
     (px, py), (bx, by) = point, centre
     if (px, py) == (0, 0):
@@ -435,9 +432,7 @@ def hides(point: Point, centre: Point, radius: int) -> bool:
     return 0 < part < 1 and away <= radius**2
 
 
-def _lines(
-    heights: Heights | None, c: int, u: int, in_view: set[int], owner: Body, user: Body
-) -> dict[int, tuple[int, int]]:
+def _lines(heights, c, u, in_view, owner, user):
     """Return the heights of both ends of the lines to the points of a user in view."""
     if heights is None:
         return dict.fromkeys(in_view, (0, 0))
@@ -445,21 +440,21 @@ def _lines(
 
 
 def _count_shown(
-    at: Body,
-    user: Body,
-    points: Sequence[Point],
-    lines: Mapping[int, tuple[int, int]],
-    between: Mapping[int, Obstacle],
-    j: int,
-    heights: Heights | None,
-) -> int:
+    at,
+    user,
+    points,
+    lines,
+    between,
+    j,
+    heights,
+):
     """Return how many points of a user no body that is at home hides from a camera, and no piece.
 
     `lines` has the heights of both ends of the line to each point in view.
     """
     bodies = {n: body for n, body in between.items() if not body.poses[j].away}
 
-    def is_hidden(number: int, eye: int, to: int) -> bool:
+    def is_hidden(number, eye, to):
         x, y = user.x + points[number][0], user.y + points[number][1]
         if heights is not None and _furniture_hides(heights, at, (x, y), eye, to):
             return True
@@ -480,9 +475,7 @@ def _count_shown(
     return sum(not is_hidden(number, *line) for number, line in lines.items())
 
 
-def _points_in_view(
-    walls: I64, eye: Eye, at: Body, heading: int, user: Body, points: Sequence[Point]
-) -> set[int]:
+def _points_in_view(walls, eye, at, heading, user, points):
     """Return which points of a body are in range, in the wedge, and behind no wall."""
     in_view = set()
     for number, (px, py) in enumerate(points):

@@ -8,12 +8,12 @@ import numpy as np
 import shapely
 from tests.reference.routes import length_of, straight_ways
 
-from fleet2d.kernels import CELL_CENTRE, I16, I32, I64, SUB, Corners
+from fleet2d.kernels import CELL_CENTRE, SUB
 
 Place = tuple[int, int]
 
 
-def is_clear(disc: I64, a: Place, b: Place, *, may_leave: bool) -> bool:
+def is_clear(disc, a, b, *, may_leave):
     """Return whether a straight leg keeps clear of a disc, or leaves it if that is allowed."""
     x, y, reach = (int(value) for value in disc)
     if may_leave and math.dist(a, (x, y)) <= reach:
@@ -22,7 +22,7 @@ def is_clear(disc: I64, a: Place, b: Place, *, may_leave: bool) -> bool:
     return bool(shapely.distance(shapely.LineString([a, b]), shapely.Point(x, y)) > reach)
 
 
-def octagon(disc: I64) -> list[Place]:
+def octagon(disc):
     """Return the corners of an octagon around a disc."""
     x, y, reach = (int(value) for value in disc)
     far = reach * 10824 // 10000 + 3
@@ -34,14 +34,14 @@ def octagon(disc: I64) -> list[Place]:
 class SlowDetours:
     """The space, and the corners at which ways bend."""
 
-    def __init__(self, region: shapely.Geometry, vertices: I64, corners: Corners) -> None:
+    def __init__(self, region, vertices, corners):
         self._region = region
         self._corners = [tuple(vertices[v].tolist()) for v in corners.vertex]
         self._walls = dict(
             zip(self._corners, zip(corners.before, corners.after, corners.simple, strict=True), strict=True)
         )  # fmt: skip
 
-    def length(self, start: Place, goal: Place, discs: I64) -> float:
+    def length(self, start, goal, discs):
         """Return the length of the shortest way, met disc after met disc; infinity for none."""
         if any(math.dist(goal, disc[:2]) <= disc[2] for disc in discs):
             return math.inf
@@ -55,10 +55,10 @@ class SlowDetours:
                 return length_of(np.array(way))
             met |= hit
 
-    def _passes(self, disc: I64, way: list[Place]) -> bool:
+    def _passes(self, disc, way):
         return all(is_clear(disc, a, b, may_leave=i == 0) for i, (a, b) in enumerate(pairwise(way)))
 
-    def _shortest(self, start: Place, goal: Place, met: I64, discs: I64) -> list[Place] | None:
+    def _shortest(self, start, goal, met, discs):
         beside = [at for disc in met for at in octagon(disc)]
         free = [at for at in beside if all(math.dist(at, disc[:2]) > disc[2] for disc in discs)]
         inside = shapely.contains_properly(self._region, shapely.points(np.array(free or [(0, 0)])))
@@ -68,8 +68,8 @@ class SlowDetours:
             *self._corners,
             *(at for at, ok in zip(free, inside, strict=False) if ok),
         ]
-        queue: list[tuple[float, list[Place]]] = [(0.0, [start])]
-        done: set[Place] = set()
+        queue = [(0.0, [start])]
+        done = set()
         while queue:
             travelled, way = heapq.heappop(queue)
             here = way[-1]
@@ -87,12 +87,12 @@ class SlowDetours:
                     heapq.heappush(queue, (travelled + math.dist(here, at), [*way, at]))
         return None
 
-    def _is_leg(self, a: Place, b: Place, discs: I64, *, may_leave: bool) -> bool:
+    def _is_leg(self, a, b, discs, *, may_leave):
         """Return whether a way may use the straight leg between two places in free space."""
         is_taut = self._is_taut(a, b) and self._is_taut(b, a)
         return is_taut and all(is_clear(disc, a, b, may_leave=may_leave) for disc in discs)
 
-    def _is_taut(self, corner: Place, other: Place) -> bool:
+    def _is_taut(self, corner, other):
         """Return whether a string from another place can bend round a corner."""
         before, after, simple = self._walls.get(corner, (None, None, False))
         if not simple:
@@ -101,14 +101,12 @@ class SlowDetours:
         return not sides[0] * sides[1] < 0
 
     @staticmethod
-    def _side(a: Place, b: Place, c: I64) -> int:
+    def _side(a, b, c):
         turn = (b[0] - a[0]) * (int(c[1]) - a[1]) - (b[1] - a[1]) * (int(c[0]) - a[0])
         return (turn > 0) - (turn < 0)
 
 
-def place_beside(
-    floor: tuple[I32, int, I16, int], place: Place, start: Place, slack: int, discs: I64
-) -> Place | None:
+def place_beside(floor, place, start, slack, discs):
     """Return the clear cell nearest to a place; of those about as near, the nearest to `start`."""
     parts, part, rooms, room = floor
     is_floor = (parts == part) & ((rooms == room) | (room < 0))
@@ -119,4 +117,4 @@ def place_beside(
             found.append((math.dist(start, at), math.dist(place, at), at[1], at[0]))
     nearest = min((away for _, away, *_ in found), default=0.0)
     near = [each for each in found if each[1] <= nearest + slack]
-    return min(near)[:1:-1] if near else None  # type: ignore[return-value]
+    return min(near)[:1:-1] if near else None

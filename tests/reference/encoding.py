@@ -1,19 +1,15 @@
 """Arrays as bytes, value by value, in slow and obvious Python."""
 
-from collections.abc import Sequence
 from itertools import groupby, pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS
-from fleet2d.kernels import I64
 
 WHOLE = 2**64
 
 
-def encode_arrays(arrays: Sequence[NDArray[Any]]) -> bytes:
+def encode_arrays(arrays):
     """Return what the core should return for arrays."""
     content, previous = b"", None
     for values in arrays:
@@ -23,7 +19,7 @@ def encode_arrays(arrays: Sequence[NDArray[Any]]) -> bytes:
     return content
 
 
-def _encode(values: NDArray[Any], previous: I64 | None) -> bytes:
+def _encode(values, previous):
     raw, runs, narrow = _raw(values), _runs(values), _narrow(values)
     if values.dtype == np.uint8:
         return raw
@@ -40,15 +36,15 @@ def _encode(values: NDArray[Any], previous: I64 | None) -> bytes:
     return min(raw, narrow, runs, key=len)  # of equally short ones the first
 
 
-def _length(encoded: bytes) -> int:
+def _length(encoded):
     return len(encoded) - HEADER.size
 
 
-def _raw(values: NDArray[Any]) -> bytes:
+def _raw(values):
     return _with_header(RAW, 0, values.tobytes())
 
 
-def _narrow(values: NDArray[Any]) -> bytes:
+def _narrow(values):
     """Whole numbers in as few bytes as the greatest takes; -1 is the greatest of all."""
     if values.dtype not in (np.int32, np.int64):
         return _raw(values)
@@ -59,7 +55,7 @@ def _narrow(values: NDArray[Any]) -> bytes:
     return _with_header(NARROW, width, b"".join(_bytes(number, width) for number in numbers))
 
 
-def _runs(values: NDArray[Any]) -> bytes:
+def _runs(values):
     parts = [value.tobytes() for value in values]
     groups = [(value, len(list(group))) for value, group in groupby(parts)]
     width = _width(max((length for _, length in groups), default=0))
@@ -68,7 +64,7 @@ def _runs(values: NDArray[Any]) -> bytes:
     return _with_header(RUNS, len(groups), content)
 
 
-def _growth(values: I64) -> bytes | None:
+def _growth(values):
     if len(values) == 0:
         return None
     growth = [(int(b) - int(a)) % WHOLE for a, b in pairwise(values)]
@@ -77,7 +73,7 @@ def _growth(values: I64) -> bytes | None:
     return _with_header(GROWTH, 0, content)
 
 
-def _line(values: I64, previous: I64 | None) -> bytes | None:
+def _line(values, previous):
     """The line through the first and the last value, if all are on it, modulo 2^64."""
     if previous is None or len(previous) != len(values) or len(values) < 3:
         return None
@@ -92,18 +88,18 @@ def _line(values: I64, previous: I64 | None) -> bytes | None:
     return _with_header(LINE, 0, _bytes(start % WHOLE, 8) + _bytes(slope % WHOLE, 8))
 
 
-def _signed(number: int) -> int:
+def _signed(number):
     """Return a number as 64 bits hold it."""
     return (number + WHOLE // 2) % WHOLE - WHOLE // 2
 
 
-def _width(number: int) -> int:
+def _width(number):
     return next(width for width in (1, 2, 4, 8) if number < 1 << 8 * width)
 
 
-def _bytes(number: int, width: int) -> bytes:
+def _bytes(number, width):
     return np.array(number, f"u{width}").tobytes()
 
 
-def _with_header(encoding: int, count: int, content: bytes) -> bytes:
+def _with_header(encoding, count, content):
     return HEADER.pack(encoding, count, len(content)) + content

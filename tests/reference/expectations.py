@@ -10,14 +10,14 @@ Formula = tuple[Any, ...]
 
 
 def robustness(
-    formula: Formula,
-    signals: dict[str, list[float]],
-    step: int,
-    end: int,
+    formula,
+    signals,
+    step,
+    end,
     *,
-    over: bool,
-    high: bool,
-) -> float:
+    over,
+    high,
+):
     """Return the robustness of a formula at a step.
 
     Args:
@@ -29,17 +29,17 @@ def robustness(
         high: Whether the best is assumed of what isn't known.
     """
 
-    def of(part: Formula, at: int, best: bool = high) -> float:
+    def of(part, at, best=high):
         return robustness(part, signals, at, end, over=over, high=best)
 
-    def later(steps: Steps) -> tuple[range, bool]:
+    def later(steps):
         """Return the known steps of a window, and whether it goes on beyond them."""
         low, high = steps if isinstance(steps, tuple) else (0, steps)
         last = end - 1 if high is None else step + high
         unknown = not over if high is None else last >= end
         return range(step + low, min(last, end - 1) + 1), unknown
 
-    def earlier(steps: Steps) -> range:
+    def earlier(steps):
         """Return the steps of a window in the past, the latest first."""
         low, high = steps if isinstance(steps, tuple) else (0, steps)
         return range(step - low, -1 if high is None else max(-1, step - high - 1), -1)

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from fleet2d.kernels import I32, I64, Bool, GroupRule, RoomFloor
 
-
-def corner_sums(mask: Bool) -> I32:
+def corner_sums(mask):
     """Count the cells above and left of every corner."""
     rows, columns = mask.shape
     sums = np.zeros((rows + 1, columns + 1), np.int32)
@@ -14,12 +12,12 @@ def corner_sums(mask: Bool) -> I32:
     return sums
 
 
-def mask_of(sums: I32) -> Bool:
+def mask_of(sums):
     """Return the mask whose `corner_sums` are given."""
     return np.diff(np.diff(sums, axis=0), axis=1).astype(bool)
 
 
-def group_places(floor: RoomFloor, occupied: Bool, group: GroupRule) -> I64:
+def group_places(floor, occupied, group):
     """Turn the window for each wall, and look at the cells of the group at every place."""
     before_walls = [mask_of(sums) for sums in floor.before_walls]
     places = []

@@ -1,19 +1,19 @@
 """How a body goes on when somebody is in its way, row by row and place by place: slow and obvious."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
-from fleet2d.kernels import CELL_CENTRE, I32, I64, SUB, walking_distance
+from fleet2d.kernels import CELL_CENTRE, SUB, walking_distance
 
 Row = list[int]
 """Time, x, y, heading, away."""
 ENDLESS = 2**63 - 1
 
 
-def delayed(rest: list[Row], since: int, pose: Row, later: int) -> tuple[list[Row], int]:
+def delayed(rest, since, pose, later):
     """Return rows later than they were planned, and when the rest begins that makes up for it."""
     rows = [[since, *pose], *rest]
     edge = rows[-1][0]
@@ -25,7 +25,7 @@ def delayed(rest: list[Row], since: int, pose: Row, later: int) -> tuple[list[Ro
     return [[time, *row[1:]] for time, row in zip(times, rest, strict=True)], edge
 
 
-def next_stop(rows: list[Row], moment: int) -> int:
+def next_stop(rows, moment):
     """Return the row from which on a body stands after a moment, where it can stand anywhere."""
     for i, (here, after) in enumerate(pairwise(rows)):
         begun = [row for row in rows if row[0] <= moment]
@@ -40,24 +40,20 @@ Delay = tuple[int, int, int, int]
 """After which moment it counts, since when it is late, by how much, and up to when."""
 
 
-def rested(way: list[Row], until: int, beat: int) -> list[Row]:
+def rested(way, until, beat):
     """Return a way that stays until a moment; if it is late, until the next beat."""
     leaves = max(until, -(-way[-1][0] // beat) * beat)
     return [*way, [leaves, *way[-1][1:]]] if leaves > way[-1][0] else way
 
 
-def going_on(
-    way: list[Row], rows: list[Row], after: int, since: int, first: int
-) -> tuple[list[Row], Delay]:
+def going_on(way, rows, after, since, first):
     """Return a way with the rows of a track from number `first` on, delayed, and the delay."""
     later = way[-1][0] - since
     rest, edge = delayed(rows[first:], since, way[-1][1:], later)
     return [*way, *rest], (after, since, later, edge)
 
 
-def stopping_beside(
-    way: list[Row], rows: list[Row], stop: int, walk: Walk, beat: int
-) -> tuple[list[Row], list[Delay]] | None:
+def stopping_beside(way, rows, stop, walk, beat):
     """Return a way that ends beside a stop of a track, with the rest of the track from there on."""
     begin = way[0][0]
     since = max(rows[stop][0], begin)
@@ -81,14 +77,14 @@ def stopping_beside(
 
 
 def way_round(
-    now: Row,
-    rows: list[Row],
-    met: int,
-    discs: list[list[int]],
-    beside: list[int] | None,
-    walk: Walk,
-    beat: int,
-) -> tuple[list[Row], list[Delay]] | None:
+    now,
+    rows,
+    met,
+    discs,
+    beside,
+    walk,
+    beat,
+):
     """Return the way round discs to the next stop of a track after a moment, or beside it."""
     stop = next_stop(rows, met)
     if stop < 0:
@@ -107,9 +103,7 @@ def way_round(
     return way, [delay]
 
 
-def way_from_here(
-    now: Row, rows: list[Row], met: int, walk: Walk, beat: int
-) -> tuple[list[Row], list[Delay]] | None:
+def way_from_here(now, rows, met, walk, beat):
     """Return the way on from where a body is, in place of the next stop after a moment."""
     stop = next_stop(rows, met)
     is_last = stop < 0
@@ -119,12 +113,12 @@ def way_from_here(
 
 
 def places_aside(
-    part_of_cell: I32,
-    part: int,
-    start: tuple[int, int],
-    search: tuple[int, int, int],
-    ways: Iterable[tuple[I64, int]],
-) -> list[tuple[int, int]]:
+    part_of_cell,
+    part,
+    start,
+    search,
+    ways,
+):
     """Return places that no way, int64 (n, 2), comes near to by its distance, the nearest first."""
     within, spacing, most = search
     row, column = start[1] // SUB, start[0] // SUB
@@ -141,6 +135,6 @@ def places_aside(
     return [place for *_, place in sorted(found)[:most]]
 
 
-def first_free(candidates: Iterable[list[Row]], is_free: Callable[[I64], bool]) -> list[Row] | None:
+def first_free(candidates, is_free):
     """Return the first of some tracks that meets nobody."""
     return next((rows for rows in candidates if is_free(np.array(rows))), None)

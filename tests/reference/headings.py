@@ -9,13 +9,13 @@ PARTS = 8192
 
 
 @cache
-def pi() -> Decimal:
+def pi():
     """Return pi by Machin's formula, 16 atan(1/5) - 4 atan(1/239)."""
     with localcontext(prec=DIGITS + 10):
         return 16 * _atan_of_inverse(5) - 4 * _atan_of_inverse(239)
 
 
-def _atan_of_inverse(n: int) -> Decimal:
+def _atan_of_inverse(n):
     term, total, k = 1 / Decimal(n), Decimal(0), 0
     while abs(term) > Decimal(10) ** -(DIGITS + 5):
         total += term / (2 * k + 1) * (-1) ** k
@@ -25,7 +25,7 @@ def _atan_of_inverse(n: int) -> Decimal:
 
 
 @cache
-def sine(part: int) -> Decimal:
+def sine(part):
     """Return the sine of part / 8192 of a turn, by its Taylor series."""
     with localcontext(prec=DIGITS):
         x = 2 * pi() * (part % PARTS) / PARTS
@@ -37,24 +37,24 @@ def sine(part: int) -> Decimal:
         return total
 
 
-def cosine(part: int) -> Decimal:
+def cosine(part):
     """Return the cosine of part / 8192 of a turn."""
     return sine(part + PARTS // 4)
 
 
-def alignment(part: int, dx: int, dy: int) -> Decimal:
+def alignment(part, dx, dy):
     """Return the length of (dx, dy) along the direction part / 8192 of a turn."""
     return dx * cosine(part) + dy * sine(part)
 
 
-def nearest_headings(dx: int, dy: int) -> set[int]:
+def nearest_headings(dx, dy):
     """Return the heading(s) best aligned with (dx, dy): two if no sixty digits tell them apart."""
     along = [(alignment(2 * heading, dx, dy), heading) for heading in _candidates(dx, dy)]
     best = max(along)[0]
     return {heading for value, heading in along if best - value < Decimal(10) ** -45}
 
 
-def _candidates(dx: int, dy: int) -> list[int]:
+def _candidates(dx, dy):
     """Halve the circle down to a few headings: alignment has one maximum on it."""
     low, high = max(
         (((q * 1024), (q + 1) * 1024) for q in range(4)),

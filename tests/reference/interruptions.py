@@ -1,12 +1,9 @@
 """Interruptions of a day in plain Python: what `src/core/interruptions.hpp` says."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
-
-from tests.reference.planner import RoomTimes
+from typing import NamedTuple
 
 from fleet2d._core import Bits
-from fleet2d.runtime.determinism import Draws
 
 DAY_S = 86_400
 CHANCE_BITS, QUANTILE_BITS = 10, 8
@@ -69,24 +66,24 @@ class SlowInterruptions:
 
     def __init__(
         self,
-        needs: Sequence[Any],
-        errands: Sequence[Any],
-        away: Sequence[int],
-        uninterruptible: Sequence[int],
-        sleep: int,
-        activities: int,
-    ) -> None:
+        needs,
+        errands,
+        away,
+        uninterruptible,
+        sleep,
+        activities,
+    ):
         self.needs = [CoreNeed(*need) for need in needs]
         self.errands = [CoreErrand(*errand) for errand in errands]
         self.away, self.uninterruptible, self.sleep = set(away), set(uninterruptible), sleep
 
     def interrupt(
         self,
-        draws: Draws,
-        day: Sequence[Any],
-        use: RoomTimes | None = None,
-        rooms: Sequence[Sequence[int]] = (),
-    ) -> list[tuple[int, ...]]:
+        draws,
+        day,
+        use=None,
+        rooms=(),
+    ):
         rows = [PlannedRow(*row) for row in day]
         return [tuple(part) for part in _InterruptedDay(self, draws, rows, use, rooms).result]
 
@@ -106,14 +103,14 @@ class _InterruptedDay:
 
     def __init__(
         self,
-        rules: SlowInterruptions,
-        draws: Draws,
-        day: Sequence[PlannedRow],
-        use: RoomTimes | None,
-        rooms: Sequence[Sequence[int]],
-    ) -> None:
+        rules,
+        draws,
+        day,
+        use,
+        rooms,
+    ):
         self.rules, self.bits, self.use, self.rooms = rules, Bits(draws), use, rooms
-        self.result: list[PartRow] = []
+        self.result = []
         begin = day[0].begin
         self.due = [begin + self._draw_part(need.every) for need in rules.needs]
         self.has_waited = [False] * len(rules.needs)
@@ -138,20 +135,20 @@ class _InterruptedDay:
             else:
                 self._mark_finishing()
 
-    def _mark_finishing(self) -> None:
+    def _mark_finishing(self):
         """Mark the last interruptions as the end of their activity, which isn't resumed."""
         i = len(self.result) - 1
         while self.result[i].role == INTERRUPTS:
             self.result[i] = self.result[i]._replace(role=FINISHES)
             i -= 1
 
-    def _skip_needs(self) -> None:
+    def _skip_needs(self):
         """Let needs that occur out of the home be met there."""
         for i, need in enumerate(self.rules.needs):
             if self.due[i] < self.end:
                 self.due[i] = self.end + self._draw_part(need.every)
 
-    def _interrupt_sleep(self, before: int) -> None:
+    def _interrupt_sleep(self, before):
         """Add errands and needs before sleep, and needs in the night."""
         if before != self.rules.sleep:
             self._do_errands(before)
@@ -168,7 +165,7 @@ class _InterruptedDay:
                 at = max(at, self.now) + self._draw_time(need.asleep)
             self.due[i] = self.end + self._draw_part(need.every)
 
-    def _interrupt_activity(self, before: int, after: int) -> None:
+    def _interrupt_activity(self, before, after):
         """Add errands and needs to an activity at home, in order of time."""
         needs, away, activity = self.rules.needs, self.rules.away, self.episode.activity
         if before != activity and before != self.rules.sleep:
@@ -188,7 +185,7 @@ class _InterruptedDay:
                 if self._happens(need.chances[2]):
                     self._meet(i, self.end)
 
-    def _meet_due_needs(self, after: int) -> None:
+    def _meet_due_needs(self, after):
         """Meet the needs that are due before the activity ends, or put them off until its end."""
         needs = self.rules.needs
         is_uninterruptible = self.episode.activity in self.rules.uninterruptible
@@ -205,19 +202,19 @@ class _InterruptedDay:
             else:
                 self._meet(i, self.end if waits else at)
 
-    def _happens(self, chance: int) -> bool:
+    def _happens(self, chance):
         """Draw whether something of a probability happens, given in parts of CERTAIN."""
         return chance > 0 and (chance >= CERTAIN or self.bits.take(CHANCE_BITS) < chance)
 
-    def _draw_time(self, quantiles: Quantiles) -> int:
+    def _draw_time(self, quantiles):
         """Draw a time from a law [s]."""
         return quantiles[self.bits.take(QUANTILE_BITS)]
 
-    def _draw_part(self, quantiles: Quantiles) -> int:
+    def _draw_part(self, quantiles):
         """Draw a time from a law, and a uniform part of it [s]."""
         return (self._draw_time(quantiles) * self.bits.take(QUANTILE_BITS)) >> QUANTILE_BITS
 
-    def _do_errands(self, before: int) -> None:
+    def _do_errands(self, before):
         """Add the errands between the activity before and the present one."""
         for errand in self.rules.errands:
             fits = (errand.after is None or before in errand.after) and (
@@ -227,7 +224,7 @@ class _InterruptedDay:
             if fits and self._happens(chance):
                 self._insert([(activity, self._draw_time(takes))], self.now)
 
-    def _meet(self, number: int, at: int) -> None:
+    def _meet(self, number, at):
         """Meet a need at a time, or shortly before the end of the activity, if there is time."""
         need = self.rules.needs[number]
         self.due[number] = max(at, self.now) + self._draw_time(need.every)
@@ -243,7 +240,7 @@ class _InterruptedDay:
         if steps and not self._insert(steps, at):
             self.due[number] = self.end
 
-    def _insert(self, steps: Sequence[tuple[int, int]], at: int) -> bool:
+    def _insert(self, steps, at):
         """Insert steps into the activity at about a time; return whether there is room for them."""
         duration = sum(takes for _, takes in steps)
         latest = self.end - duration
@@ -268,12 +265,10 @@ class _InterruptedDay:
         self.now = at
         return True
 
-    def _private_rooms(self, activity: int) -> Sequence[int]:
+    def _private_rooms(self, activity):
         return () if self.use is None else self.rooms[activity]
 
-    def _free_room(
-        self, rooms: Sequence[int], at: int, latest: int, duration: int
-    ) -> tuple[int, int] | None:
+    def _free_room(self, rooms, at, latest, duration):
         """Return the first time at which one of the rooms is free for long enough, and the room."""
         if self._private_rooms(self.episode.activity) and self.episode.room in rooms:
             return at, self.episode.room  # the person is already alone in it
@@ -281,7 +276,7 @@ class _InterruptedDay:
         slot = self.use.free(rooms, at, latest, duration, self.end)
         return None if slot is None else (slot[0], slot[2])
 
-    def _continue(self, until: int) -> None:
+    def _continue(self, until):
         """Add the planned episode up to a time."""
         activity, _, _, room = self.episode
         role = PLANNED if self.is_fresh else RESUMES

@@ -1,12 +1,9 @@
 """Slow, obvious twins of the kernels that lay out the rooms of synthetic homes."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 from math import fsum
 
 import numpy as np
-
-from fleet2d.kernels import F64, I64, CorridorRule, Divisions
 
 Box = tuple[int, int, int, int, int]
 WALL = 2
@@ -16,27 +13,27 @@ DEEPEST = 240
 REACH = 25
 
 
-def table(boxes: Sequence[Box]) -> I64:
+def table(boxes):
     return np.array(boxes, np.int64).reshape(-1, 5)
 
 
-def squarest_rooms(trees: Divisions, areas: F64, sides: I64, mouths: I64) -> I64:
+def squarest_rooms(trees, areas, sides, mouths):
     """Cut the rectangle by each tree, and keep the squarest rooms."""
     made = [_sliced(_tree(trees.nodes, int(start)), areas, *sides) for start in trees.starts]
 
-    def penalty(boxes: list[Box]) -> float:
+    def penalty(boxes):
         blocked = sum(not any(_holds(box, mouth) for box in boxes) for mouth in mouths.tolist())
         return slenderness(boxes) + MOUTH_PENALTY * blocked
 
     return table(min(made, key=penalty) if made else [])
 
 
-def _holds(box: Box, mouth: tuple[int, int, int, int]) -> bool:
+def _holds(box, mouth):
     _, x0, y0, x1, y1 = box
     return x0 <= mouth[0] and mouth[2] <= x1 and y0 <= mouth[1] and mouth[3] <= y1
 
 
-def _tree(nodes: I64, start: int) -> tuple:
+def _tree(nodes, start):
     """Return a node with its parts: (kind, number, parts)."""
     kind, number = nodes[start].tolist()
     parts = []
@@ -47,22 +44,22 @@ def _tree(nodes: I64, start: int) -> tuple:
     return kind, number, parts
 
 
-def _size(tree: tuple) -> int:
+def _size(tree):
     return 1 + sum(_size(part) for part in tree[2])
 
 
-def _area(tree: tuple, areas: F64) -> float:
+def _area(tree, areas):
     kind, number, parts = tree
     if kind >= 0:
         return areas[kind] * number / 100
     return fsum(_area(part, areas) for part in parts)
 
 
-def _sliced(tree: tuple, areas: F64, x0: int, y0: int, x1: int, y1: int) -> list[Box]:
+def _sliced(tree, areas, x0, y0, x1, y1):
     kind, _, parts = tree
     if kind >= 0:
         return [(kind, x0, y0, x1, y1)]
-    boxes: list[Box] = []
+    boxes = []
     low, high = (x0, x1) if kind == -2 else (y0, y1)
     spans = divide_span([_area(part, areas) for part in parts], low, high)
     for part, (start, end) in zip(parts, spans, strict=True):
@@ -71,7 +68,7 @@ def _sliced(tree: tuple, areas: F64, x0: int, y0: int, x1: int, y1: int) -> list
     return boxes
 
 
-def divide_span(sizes: Sequence[float], low: int, high: int) -> list[tuple[int, int]]:
+def divide_span(sizes, low, high):
     """Divide [low, high] in proportion to sizes."""
     total = fsum(sizes)
     ends = [low]
@@ -82,7 +79,7 @@ def divide_span(sizes: Sequence[float], low: int, high: int) -> list[tuple[int, 
     return list(pairwise(ends))
 
 
-def slenderness(boxes: Sequence[Box]) -> float:
+def slenderness(boxes):
     """Add how much longer than 1.2 times the other side the sides of rooms are, squared."""
     total = 0.0
     for _, x0, y0, x1, y1 in boxes:
@@ -96,7 +93,7 @@ def slenderness(boxes: Sequence[Box]) -> float:
     return total
 
 
-def is_promising(boxes: I64, limits: F64) -> bool:
+def is_promising(boxes, limits):
     """Compare the sides of every room with its limits."""
     for room, x0, y0, x1, y1 in boxes.tolist():
         short, long = sorted((x1 - x0 - WALL, y1 - y0 - WALL))
@@ -105,7 +102,7 @@ def is_promising(boxes: I64, limits: F64) -> bool:
     return True
 
 
-def _widths(slots: I64, areas: F64, depth: int) -> list[float]:
+def _widths(slots, areas, depth):
     sizes = [areas[a] if b < 0 else areas[a] + areas[b] for a, b, _ in slots.tolist()]
     return [
         max(size / (depth + bay), MIN_SLOT_WIDTH)
@@ -113,7 +110,7 @@ def _widths(slots: I64, areas: F64, depth: int) -> list[float]:
     ]
 
 
-def _depth(slots: I64, areas: F64, length: int) -> int:
+def _depth(slots, areas, length):
     """Return the depth at which slots have a length, 0 for none."""
     low = max(20, 20 - int(slots[:, 2].min()))
     if not slots[:, 2].any():
@@ -128,8 +125,8 @@ def _depth(slots: I64, areas: F64, length: int) -> int:
     return DEEPEST
 
 
-def _strip(slots: I64, areas: F64, length: int, depth: int) -> list[Box]:
-    boxes: list[Box] = []
+def _strip(slots, areas, length, depth):
+    boxes = []
     spans = divide_span(_widths(slots, areas, depth), 0, length)
     for (first, second, bay), (x0, x1) in zip(slots.tolist(), spans, strict=True):
         back = depth + bay
@@ -141,15 +138,13 @@ def _strip(slots: I64, areas: F64, length: int, depth: int) -> list[Box]:
     return boxes
 
 
-def _deepened(slots: I64, corridor: CorridorRule) -> I64:
+def _deepened(slots, corridor):
     deeper = slots.copy()
     deeper[-1, 2] += corridor.width if corridor.suite else 0
     return deeper
 
 
-def _beside(
-    corridor: CorridorRule, strip: list[Box], areas: F64
-) -> tuple[list[Box], list[Box]] | None:
+def _beside(corridor, strip, areas):
     """Return the corridor with its closet, and the strip above it, or None."""
     width = corridor.width
     length = strip[-1][3]
@@ -160,22 +155,20 @@ def _beside(
         else (room, x0, y0, x1, y1)
         for room, x0, y0, x1, y1 in strip
     ]
-    hallway: list[Box] = []
+    hallway = []
     if corridor.closet >= 0:
         end -= min(max(int(areas[corridor.closet] / width + 0.5), 24), 52)
         hallway = [(corridor.closet, end, 0, length, width)]
     return None if end < 24 else ([*hallway, (corridor.hall, 0, 0, end, width)], above)
 
 
-def strip_rooms(slots: I64, areas: F64, length: int, least: int, most: int) -> I64:
+def strip_rooms(slots, areas, length, least, most):
     """Find the depth, and place the rooms one by one."""
     depth = _depth(slots, areas, length)
     return table(_strip(slots, areas, length, depth) if least <= depth <= most else [])
 
 
-def row_rooms(
-    slots: I64, areas: F64, corridor: CorridorRule, length: int, least: int, most: int
-) -> I64:
+def row_rooms(slots, areas, corridor, length, least, most):
     """Place the strip, and the corridor beside it."""
     deep = _deepened(slots, corridor)
     depth = _depth(deep, areas, length)
@@ -186,14 +179,14 @@ def row_rooms(
 
 
 def wing_rooms(
-    front: I64,
-    back: I64,
-    areas: F64,
-    corridor: CorridorRule,
-    back_depth: int,
-    least: int,
-    most: int,
-) -> tuple[I64, int]:
+    front,
+    back,
+    areas,
+    corridor,
+    back_depth,
+    least,
+    most,
+):
     """Place the strip above, then the strip below it that is as long, then the corridor."""
     deep = _deepened(back, corridor)
     length = int(fsum(_widths(deep, areas, back_depth)) + 0.5)
@@ -210,15 +203,15 @@ def wing_rooms(
 
 
 def squarest_depth(
-    front: I64,
-    back: I64,
-    areas: F64,
-    corridor: CorridorRule,
-    depths: I64,
-    least: int,
-    most: int,
-    limits: F64,
-) -> int:
+    front,
+    back,
+    areas,
+    corridor,
+    depths,
+    least,
+    most,
+    limits,
+):
     """Place the wing at each depth, and compare those that are promising."""
     scores = []
     for number, depth in enumerate(depths.tolist()):

@@ -3,23 +3,20 @@
 Walls are int64 (w, 4): ax, ay, bx, by. Nothing here may import the package under test.
 """
 
-from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
-
-from fleet2d.kernels import I64, Bool
 
 Point = tuple[int, int]
 CELL, CELL_CENTRE = 64, 33
 
 
-def cross(ax: int, ay: int, bx: int, by: int) -> int:
+def cross(ax, ay, bx, by):
     """Return the cross product of two vectors."""
     return ax * by - ay * bx
 
 
-def segments_touch(p: Point, q: Point, a: Point, b: Point) -> bool:
+def segments_touch(p, q, a, b):
     """Return whether the closed segments pq and ab share a point; plain Python integers."""
     side_a = cross(q[0] - p[0], q[1] - p[1], a[0] - p[0], a[1] - p[1])
     side_b = cross(q[0] - p[0], q[1] - p[1], b[0] - p[0], b[1] - p[1])
@@ -34,18 +31,17 @@ def segments_touch(p: Point, q: Point, a: Point, b: Point) -> bool:
     return all(overlap)
 
 
-def is_inside(walls: I64, points: I64) -> Bool:
+def is_inside(walls, points):
     """Return for each point whether a ray to the right crosses an odd number of walls."""
     x, y = points[:, None, 0], points[:, None, 1]
     ax, ay, bx, by = walls.T
     spans = (ay > y) != (by > y)
     turn = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     left_of_rising = np.where(by > ay, turn > 0, turn < 0)
-    odd: Bool = (spans & left_of_rising).sum(axis=1) % 2 == 1
-    return odd
+    return (spans & left_of_rising).sum(axis=1) % 2 == 1
 
 
-def touches_any_wall(walls: I64, eye: I64, points: I64) -> Bool:
+def touches_any_wall(walls, eye, points):
     """Return for each point whether the closed segment from `eye` to it touches a wall."""
     (qx, qy), (px, py) = eye, points.T[:, :, None]
     ax, ay, bx, by = walls.T
@@ -62,28 +58,27 @@ def touches_any_wall(walls: I64, eye: I64, points: I64) -> Bool:
         <= np.minimum(np.maximum(qy, py), np.maximum(ay, by))
     )
     touches = (side_a * side_b <= 0) & (side_q * side_p <= 0) & boxes_meet
-    found: Bool = touches.any(axis=1)
-    return found
+    return touches.any(axis=1)
 
 
-def visible(walls: I64, eye: I64, points: I64) -> Bool:
+def visible(walls, eye, points):
     """Return for each point whether it is visible from `eye` by the strict rule."""
     if not is_inside(walls, eye[None])[0]:
         return np.zeros(len(points), bool)
     return is_inside(walls, points) & ~touches_any_wall(walls, eye, points)
 
 
-def visible_exactly(walls: Sequence[Sequence[int]], eye: Point, point: Point) -> bool:
+def visible_exactly(walls, eye, point):
     """Return the same for one point that lies inside, in plain Python integers."""
     return not any(segments_touch(eye, point, (w[0], w[1]), (w[2], w[3])) for w in walls)
 
 
-def on_any_wall(walls: I64, points: I64) -> Bool:
+def on_any_wall(walls, points):
     """Return for each point whether it lies on a wall, ends included."""
     return np.array([touches_any_wall(walls, point, point[None])[0] for point in points], bool)
 
 
-def blocks(p: Point, q: Point, a: Point, b: Point) -> bool:
+def blocks(p, q, a, b):
     """Return whether the wall ab keeps a straight way from leading from p to q.
 
     It may touch the way at p and q; a wall along the way blocks only if it ends in between.
@@ -98,13 +93,13 @@ def blocks(p: Point, q: Point, a: Point, b: Point) -> bool:
     return not touch_at_end
 
 
-def _is_between(p: Point, q: Point, c: Point) -> bool:
+def _is_between(p, q, c):
     """Return whether c, in line with p and q, lies strictly between them."""
     along = (c[0] - p[0]) * (q[0] - p[0]) + (c[1] - p[1]) * (q[1] - p[1])
     return 0 < along < (q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2
 
 
-def vertices_seen(walls: I64, start: Point) -> set[Point]:
+def vertices_seen(walls, start):
     """Return the ends of walls that a straight way leads to, from a point that isn't outside.
 
     Between its ends the way meets no wall, unless it runs along one from end to end or to one end.
@@ -122,12 +117,12 @@ def vertices_seen(walls: I64, start: Point) -> set[Point]:
     return seen
 
 
-def _covers(a: Point, b: Point, point: Point) -> bool:
+def _covers(a, b, point):
     """Return whether the point lies on the closed segment ab."""
     return segments_touch(a, b, point, point)
 
 
-def visible_area(walls: I64, eye: Point) -> Fraction:
+def visible_area(walls, eye):
     """Return the exact area visible from a point strictly inside.
 
     Between two neighboring directions in which a wall ends, one wall is the nearest all the way.
@@ -151,7 +146,7 @@ def visible_area(walls: I64, eye: Point) -> Fraction:
     return area
 
 
-def _reach(ray: Point, a: Point, b: Point) -> Fraction | None:
+def _reach(ray, a, b):
     """Return how many times its length the ray from (0, 0) reaches to the line through a and b."""
     edge = (b[0] - a[0], b[1] - a[1])
     down = cross(*ray, *edge)
@@ -161,19 +156,17 @@ def _reach(ray: Point, a: Point, b: Point) -> Fraction | None:
 class _Turn:
     """Orders directions by their angle in [0, one turn), in integers."""
 
-    def __init__(self, direction: Point) -> None:
+    def __init__(self, direction):
         self.x, self.y = direction
         self.half = 0 if self.y > 0 or (self.y == 0 and self.x > 0) else 1
 
-    def __lt__(self, other: "_Turn") -> bool:
+    def __lt__(self, other):
         if self.half != other.half:
             return self.half < other.half
         return cross(self.x, self.y, other.x, other.y) > 0
 
 
-def nearest_cells_in_sight(
-    walls: I64, cells: Bool, eye: Point, reach: int, most: int, wanted: int
-) -> list[tuple[int, int]]:
+def nearest_cells_in_sight(walls, cells, eye, reach, most, wanted):
     """Sort all cells of the mask by their distance, and look at those that are near enough."""
     near = []
     for row, column in np.argwhere(cells).tolist():

@@ -9,7 +9,7 @@ Way = Callable[[float], tuple[float, float]]
 """Where a body is at a moment [steps]: x and y."""
 
 
-def first_meeting(body: Way, other: Way, near: float, first: int, end: int) -> int | None:
+def first_meeting(body, other, near, first, end):
     """Return the first step in which two bodies approach each other below a distance, or None."""
     for step in range(first, end):
         moments = step + np.arange(MOMENTS + 1) / MOMENTS

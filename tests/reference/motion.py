@@ -1,15 +1,12 @@
 """Slow, obvious twins of the motion kernels: fractions, and a look at every wall."""
 
 import math
-from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 import numpy as np
 from tests.reference.headings import cosine, sine
 from tests.reference.line_of_sight import visible
 from tests.reference.random import random_bell, random_below
-
-from fleet2d.kernels import I64
 
 Row = tuple[int, int, int, int, int]
 """A breakpoint: time [us], x, y, heading, away."""
@@ -19,17 +16,17 @@ Pose = tuple[int, int, int, int]
 TURN = 4096
 
 
-def half_up(value: Fraction) -> int:
+def half_up(value):
     """Return the nearest integer; of two, the greater."""
     return math.floor(value + Fraction(1, 2))
 
 
-def shorter_turn(start: int, end: int) -> int:
+def shorter_turn(start, end):
     """Return the signed turn of the least size; clockwise if both ways are half a turn."""
     return min((end - start + k * TURN for k in (-2, -1, 0, 1, 2)), key=lambda t: (abs(t), t))
 
 
-def pose_at(track: Sequence[Row], moment: int) -> Pose:
+def pose_at(track, moment):
     """Return the pose at a moment [us]; before its begin and after its end a track stands."""
     if moment < track[0][0]:
         return track[0][1:]
@@ -48,7 +45,7 @@ def pose_at(track: Sequence[Row], moment: int) -> Pose:
     )
 
 
-def ceiling_of_root(squared: Fraction) -> int:
+def ceiling_of_root(squared):
     """Return the least integer whose square is at least `squared`."""
     root = math.isqrt(math.floor(squared))
     while root * root < squared:
@@ -56,21 +53,21 @@ def ceiling_of_root(squared: Fraction) -> int:
     return root
 
 
-def least_walk_us(squared: int, speed: Fraction) -> int:
+def least_walk_us(squared, speed):
     """Return the least whole number of microseconds for a leg of length sqrt(squared)."""
     return ceiling_of_root(squared * (10**6 / speed) ** 2)
 
 
 def walk(
-    walls: I64,
-    space: I64,
-    key: int,
-    stride: int,
-    sway: int,
-    limit: int,
-    start: Sequence[int],
-    step: int = 0,
-) -> Iterator[tuple[int, int, int]]:
+    walls,
+    space,
+    key,
+    stride,
+    sway,
+    limit,
+    start,
+    step=0,
+):
     """Yield the poses of a random walk from a step on, by a look at every wall of the space.
 
     Both are int64 (w, 4) pieces of wall. `stride` is in 1/256 lattice units, `sway` in 2**-16
@@ -94,5 +91,5 @@ def walk(
         step += 1
 
 
-def _sees(walls: I64, here: I64, there: I64) -> bool:
+def _sees(walls, here, there):
     return bool(visible(walls, here, there[None])[0])

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from fleet2d.kernels import I64
 
-
-def move_walls(ring: I64, reach: int, half: int) -> I64:
+def move_walls(ring, reach, half):
     """Lengthen all walls at once, then move them."""
     none = np.zeros((0, 2), np.int64)
     ways = np.sign(np.roll(ring, -1, axis=0) - ring)

@@ -6,13 +6,11 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from fleet2d.kernels import I64
-
 Extents = list[int]
 """Least x, y, x + y and x - y, and the greatest ones."""
 
 
-def grown(points: list[tuple[int, int]], reach: int, half: int) -> Extents:
+def grown(points, reach, half):
     """Go round each point, and round all of that along the axes and diagonals."""
     octagon = [(a * x, b * y) for x, y in ((reach, half), (half, reach)) for a, b in SIGNS]
     corners = [(x + dx, y + dy) for x, y in points for dx, dy in octagon]
@@ -23,23 +21,23 @@ def grown(points: list[tuple[int, int]], reach: int, half: int) -> Extents:
 SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 
 
-def shape_of(extents: Extents) -> Polygon:
+def shape_of(extents):
     x0, y0, s0, d0, x1, y1, s1, d1 = extents
     turned = [((s + d) / 2, (s - d) / 2) for s, d in ((s0, d0), (s0, d1), (s1, d1), (s1, d0))]
     return shapely.intersection(shapely.box(x0, y0, x1, y1), Polygon(turned))
 
 
-def walls_of(corners: I64, ring_of: I64) -> list[list[tuple[int, int]]]:
+def walls_of(corners, ring_of):
     ends = zip(pairwise(corners.tolist()), pairwise(ring_of.tolist()), strict=True)
     return [[tuple(a), tuple(b)] for (a, b), (first, second) in ends if first == second]
 
 
-def is_slanted(wall: list[tuple[int, int]]) -> bool:
+def is_slanted(wall):
     (ax, ay), (bx, by) = wall
     return ax != bx and ay != by
 
 
-def groups_of(shapes: list[Polygon]) -> list[int]:
+def groups_of(shapes):
     """Let each shape take the lowest number of those that it touches until nothing changes."""
     number = list(range(len(shapes)))
     touching = [(i, j) for i, j in combinations(number, 2) if shapes[i].intersects(shapes[j])]
@@ -49,7 +47,7 @@ def groups_of(shapes: list[Polygon]) -> list[int]:
     return number
 
 
-def cuts_by(shapes: list[Polygon], slanted: list[bool], further: Polygon) -> int:
+def cuts_by(shapes, slanted, further):
     """Count the places where a further shape touches each group of connected shapes, but one."""
     groups = groups_of(shapes)
     near = [i for i, shape in enumerate(shapes) if shape.intersects(further)]
@@ -59,14 +57,12 @@ def cuts_by(shapes: list[Polygon], slanted: list[bool], further: Polygon) -> int
     return places - len({groups[i] for i in near})
 
 
-def table_of(
-    extents: list[Extents], slanted: list[bool]
-) -> tuple[list[Extents], list[int], list[bool]]:
+def table_of(extents, slanted):
     return extents, groups_of([shape_of(each) for each in extents]), slanted
 
 
-def table_read(table: I64) -> tuple[list[Extents], list[int], list[bool]]:
+def table_read(table):
     """Return a table of the kernel as `table_of` has it, its groups by their first obstacle."""
-    first: dict[int, int] = {}
+    first = {}
     groups = [first.setdefault(part, i) for i, part in enumerate(table[:, 8].tolist())]
     return table[:, :8].tolist(), groups, np.equal(table[:, 9], 1).tolist()

@@ -1,10 +1,9 @@
 """The planner of days in plain Python: what `src/core/planner.hpp` says, one episode at a time."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from fleet2d.routines.distributions import Distribution, draw_weighted
-from fleet2d.runtime.determinism import Draws
 
 NO_GAP_S = 300
 MILLION = 1_000_000
@@ -16,15 +15,13 @@ Row = tuple[int, int, int, int, int]
 class RoomTimes:
     """When rooms are in use, as `fleet2d.kernels.RoomUse`."""
 
-    def __init__(self) -> None:
-        self.times: dict[int, list[tuple[int, int]]] = {}
+    def __init__(self):
+        self.times = {}
 
-    def add(self, room: int, begin: int, end: int) -> None:
+    def add(self, room, begin, end):
         self.times.setdefault(room, []).append((begin, end))
 
-    def free(
-        self, rooms: Sequence[int], begin: int, latest: int, shortest: int, end_by: int
-    ) -> tuple[int, int, int] | None:
+    def free(self, rooms, begin, latest, shortest, end_by):
         slots = [
             (*slot, room)
             for room in rooms
@@ -32,9 +29,7 @@ class RoomTimes:
         ]
         return min(slots, key=lambda slot: slot[0], default=None)
 
-    def _free_in(
-        self, room: int, begin: int, latest: int, shortest: int, end_by: int
-    ) -> tuple[int, int] | None:
+    def _free_in(self, room, begin, latest, shortest, end_by):
         for first, last in sorted(self.times.get(room, ())):
             if last <= begin:
                 continue
@@ -82,13 +77,13 @@ class SlowPlanner:
 
     def __init__(
         self,
-        sleep: Sequence[Any],
-        min_sleep: int,
-        jobs: Sequence[Any],
-        pastimes: Sequence[Any],
-        rest: int,
-        asleep: int,
-    ) -> None:
+        sleep,
+        min_sleep,
+        jobs,
+        pastimes,
+        rest,
+        asleep,
+    ):
         self.sleep, self.min_sleep = Distribution(*sleep), min_sleep
         self.jobs = [
             CoreJob(activity, starts and Distribution(*starts), Distribution(*takes), *rest)
@@ -102,16 +97,16 @@ class SlowPlanner:
 
     def plan(
         self,
-        draws: Draws,
-        wake: int,
-        next_wake: int,
-        use: RoomTimes | None = None,
-        rooms: Sequence[Sequence[int]] = (),
-    ) -> list[Row]:
+        draws,
+        wake,
+        next_wake,
+        use=None,
+        rooms=(),
+    ):
         chain = self._feasible_chain(draws, wake, next_wake)
         if chain is None:
             return []
-        day: list[Row] = []
+        day = []
         now = wake
         for i, number in enumerate(chain.jobs):
             job = self.jobs[number]
@@ -134,14 +129,12 @@ class SlowPlanner:
         day.append((self.asleep, bed, next_wake, -1, -1))
         return day
 
-    def draw_order(
-        self, draws: Draws, chosen: Sequence[bool], wake: int, next_wake: int, by_deadline: bool
-    ) -> tuple[list[int], list[int], bool]:
+    def draw_order(self, draws, chosen, wake, next_wake, by_deadline):
         numbers = {i for i, is_chosen in enumerate(chosen) if is_chosen}
         chain = self._draw_chain(draws, numbers, wake, next_wake, by_deadline)
         return chain.jobs, chain.latest, self._fits(chain, wake)
 
-    def _feasible_chain(self, draws: Draws, wake: int, next_wake: int) -> JobChain | None:
+    def _feasible_chain(self, draws, wake, next_wake):
         chosen = {i for i, job in enumerate(self.jobs) if draws.below(MILLION) < job.chance}
         tries = 0
         while True:
@@ -156,13 +149,11 @@ class SlowPlanner:
                     return None
                 chosen.remove(min(dispensable, key=lambda i: (self.jobs[i].chance, -i)))
 
-    def _draw_chain(
-        self, draws: Draws, chosen: set[int], wake: int, next_wake: int, by_deadline: bool
-    ) -> JobChain:
+    def _draw_chain(self, draws, chosen, wake, next_wake, by_deadline):
         latest_bed = min(self.sleep.longest, next_wake - self.min_sleep)
         bed = self.sleep.draw(draws, None, latest_bed)
-        preferred: dict[int, int] = {}
-        ranks: dict[int, tuple[int, int, int]] = {}  # part of the day, time, number
+        preferred = {}
+        ranks = {}  # part of the day, time, number
         for i, job in enumerate(self.jobs):
             before = [k for k in job.after if k in preferred]
             follows = job.starts is None and job.place == 0
@@ -186,14 +177,14 @@ class SlowPlanner:
         latest = self._latest(order, latest_bed)
         return JobChain(order, [*(preferred[i] for i in order), bed], latest)
 
-    def _latest(self, order: Sequence[int], bed: int) -> list[int]:
+    def _latest(self, order, bed):
         latest = [bed]
         for job in (self.jobs[i] for i in reversed(order)):
             last = min(job.until, latest[-1]) - job.takes.shortest
             latest.append(last if job.starts is None else min(last, job.starts.longest))
         return latest[::-1]
 
-    def _fits(self, chain: JobChain, wake: int) -> bool:
+    def _fits(self, chain, wake):
         earliest = wake
         for i, last in zip(chain.jobs, chain.latest, strict=False):
             job = self.jobs[i]
@@ -204,7 +195,7 @@ class SlowPlanner:
             earliest += job.takes.shortest
         return max(earliest, self.sleep.shortest) <= chain.latest[-1]
 
-    def _fill(self, day: list[Row], draws: Draws, begin: int, end: int) -> None:
+    def _fill(self, day, draws, begin, end):
         while begin < end:
             last = day[-1][0] if day else -1
             options = [
@@ -230,7 +221,7 @@ class SlowPlanner:
             begin = over
 
 
-def _next_begin(job: CoreJob, now: int, preferred: int) -> int:
+def _next_begin(job, now, preferred):
     begin = max(now, preferred)
     is_soon = begin - now < NO_GAP_S and (job.starts is None or job.starts.shortest <= now)
     return now if is_soon else begin

@@ -2,25 +2,22 @@
 
 import cmath
 import math
-from collections.abc import Sequence
 from itertools import pairwise, permutations, product
-from typing import Any
 
 import numpy as np
+from scipy.optimize import linprog
 
 WEEK = 10_080
 
 
-def sighting_share(seen: Any) -> list[float]:
+def sighting_share(seen):
     """Sightings per room by all sightings; seen[bin][room] of one user."""
     rooms = len(seen[0])
     counts = [sum(bin_[room] for bin_ in seen) for room in range(rooms)]
     return [c / sum(counts) for c in counts] if sum(counts) else [1 / rooms] * rooms
 
 
-def exposure_ratio(
-    seen: Any, watched: Any, bin_steps: int, detection: float
-) -> tuple[list[float], float]:
+def exposure_ratio(seen, watched, bin_steps, detection):
     """Sightings by exposure with one bin of average beforehand; shares at home, and away."""
     rooms = range(len(seen[0]))
     n = [sum(b[r] for b in seen) / bin_steps for r in rooms]
@@ -32,9 +29,7 @@ def exposure_ratio(
     return [x / sum(rate) for x in rate], max(0.0, 1 - sum(rate) / detection)
 
 
-def stays(
-    model: Any, bins: Sequence[int], shown: Any, seen: Any, shown_before: Sequence[int]
-) -> tuple[list[Any], list[Any]]:
+def stays(model, bins, shown, seen, shown_before):
     """A person's chain written out: transitions and evidence between all states, for each stretch.
 
     States are stage of a stay, patch, and whether in the part of the patch that is in view, in
@@ -57,7 +52,7 @@ def stays(
         views = [x / 255 for x in shown[t]]
         before = shown[t - 1] if t else shown_before
 
-        def comes(row: Any, stage: int, into: int, chance: float, views: Any = views) -> None:
+        def comes(row, stage, into, chance, views=views):
             for p in range(patches):
                 if room[p] == into:
                     at = (stage * patches + p) * 2
@@ -85,7 +80,7 @@ def stays(
     return steps, weights
 
 
-def posteriors(steps: Any, weights: Any, start: Any, end: Any) -> tuple[Any, Any]:
+def posteriors(steps, weights, start, end):
     """Filtered and smoothed probabilities of the states of a chain, by products of matrices."""
     count = len(steps)
     forward = [np.asarray(start)]
@@ -101,7 +96,7 @@ def posteriors(steps: Any, weights: Any, start: Any, end: Any) -> tuple[Any, Any
     return np.array(forward[1:]), np.array([b / b.sum() for b in both])
 
 
-def people(model: Any, day: Any, prior: Any, future: Any) -> list[tuple[Any, Any]]:
+def people(model, day, prior, future):
     """Filtered and smoothed states of people one by one, each bin a stretch of its own.
 
     Args:
@@ -126,7 +121,7 @@ def people(model: Any, day: Any, prior: Any, future: Any) -> list[tuple[Any, Any
     return chains
 
 
-def fremen(minutes: Sequence[int], weight: Any, state: Any, days: int, m: int, at: int) -> float:
+def fremen(minutes, weight, state, days, m, at):
     """The forecast of order m at a minute of the week, from samples of one room, by definition."""
     n = sum(weight)
     mean = sum(state) / n
@@ -141,7 +136,7 @@ def fremen(minutes: Sequence[int], weight: Any, state: Any, days: int, m: int, a
     return min(max(p, 0.0), 1.0)
 
 
-def earth_mover(truth: Sequence[int], estimate: Sequence[int], cost: Any) -> float:
+def earth_mover(truth, estimate, cost):
     """The cheapest assignment of units to units, by trying all; weights are whole numbers."""
     here = [room for room, count in enumerate(estimate) for _ in range(count)]
     there = [room for room, count in enumerate(truth) for _ in range(count)]
@@ -152,60 +147,23 @@ def earth_mover(truth: Sequence[int], estimate: Sequence[int], cost: Any) -> flo
     return best / len(here)
 
 
-def transport(truth: Any, estimate: Any, cost: Any) -> float:
-    """The least cost of any flow, by taking out one dearer circle after the other.
-
-    From any flow to begin with: as long as some circle of ways costs less than nothing, shift mass
-    along it (Klein). That the best flow has no such circle is the theorem.
-    """
-    n = len(truth)
-    flow = np.outer(estimate, truth) / sum(truth)
-    while True:
-        # Residual network: a step from i to j by one unit more, back by one less.
-        length = np.full((2 * n, 2 * n), np.inf)
-        length[:n, n:] = cost
-        length[n:, :n] = np.where(flow > 1e-12, -np.asarray(cost), np.inf).T
-        circle = _negative_circle(length)
-        if circle is None:
-            return float((flow * cost).sum())
-        legs = list(pairwise([*circle, circle[0]]))
-        amount = min(flow[b, a - n] for a, b in legs if a >= n)
-        for a, b in legs:
-            if a < n:
-                flow[a, b - n] += amount
-            else:
-                flow[b, a - n] -= amount
+def transport(truth, estimate, cost):
+    """The least cost of any flow, as a linear program."""
+    leaves = np.kron(np.eye(len(truth)), np.ones(len(truth)))
+    arrives = np.kron(np.ones(len(truth)), np.eye(len(truth)))
+    ways = np.vstack([leaves, arrives])[:-1]  # the last one follows from the others
+    masses = 1e6 * np.concatenate([estimate, truth])[:-1]  # the solver ignores what is below 1e-7
+    return linprog(np.ravel(cost), A_eq=ways, b_eq=masses).fun / 1e6
 
 
-def _negative_circle(length: Any) -> list[int] | None:
-    """Some circle of negative length (Bellman and Ford), None if there is none."""
-    count = len(length)
-    far, before = np.zeros(count), np.full(count, -1)
-    last = -1
-    for _ in range(count):
-        last = -1
-        for a, b in product(range(count), repeat=2):
-            if far[a] + length[a, b] < far[b] - 1e-9:
-                far[b], before[b], last = far[a] + length[a, b], a, b
-    if last < 0:
-        return None
-    for _ in range(count):
-        last = before[last]
-    circle, at = [last], before[last]
-    while at != last:
-        circle.append(at)
-        at = before[at]
-    return circle[::-1]
-
-
-def brier(p: Sequence[float], truth: int) -> float:
+def brier(p, truth):
     """Sum of squares to the true place."""
     return sum((x - (1 if i == truth else 0)) ** 2 for i, x in enumerate(p))
 
 
-def in_groups(said: Sequence[float], masses: int) -> list[list[int]]:
+def in_groups(said, masses):
     """Indices of what was said by group: as often as not smaller, equal ones together."""
-    groups: list[list[int]] = [[] for _ in range(masses)]
+    groups = [[] for _ in range(masses)]
     for i, value in enumerate(said):
         below = sum(other < value for other in said)
         same = sum(other == value for other in said)
@@ -214,7 +172,7 @@ def in_groups(said: Sequence[float], masses: int) -> list[list[int]]:
     return groups
 
 
-def gaps(said: Sequence[float], true: Sequence[float], masses: int) -> float:
+def gaps(said, true, masses):
     """Mean gap between what was said and what came true, by groups."""
     total = 0.0
     for group in in_groups(said, masses):
@@ -225,7 +183,7 @@ def gaps(said: Sequence[float], true: Sequence[float], masses: int) -> float:
     return total
 
 
-def among_best(row: Sequence[float], truth: int, k: int) -> float:
+def among_best(row, truth, k):
     """Share of all orders of places, likeliest first, in which the truth is among the first k."""
     orders = [
         order
@@ -235,7 +193,7 @@ def among_best(row: Sequence[float], truth: int, k: int) -> float:
     return sum(truth in order[:k] for order in orders) / len(orders)
 
 
-def calibration_error(p: Any, truth: Sequence[int], masses: int) -> float:
+def calibration_error(p, truth, masses):
     """Gap between accuracy and confidence, by groups of equal size."""
     sure = [max(row) for row in p]
     right = [
@@ -245,7 +203,7 @@ def calibration_error(p: Any, truth: Sequence[int], masses: int) -> float:
     return gaps(sure, right, masses)
 
 
-def classwise_error(p: Any, truth: Sequence[int], masses: int) -> float:
+def classwise_error(p, truth, masses):
     """Mean over places of the gap of each place's probability."""
     places = range(len(p[0]))
     return sum(
@@ -253,7 +211,7 @@ def classwise_error(p: Any, truth: Sequence[int], masses: int) -> float:
     ) / len(places)
 
 
-def murphy(p: Any, truth: Sequence[int]) -> tuple[float, float, float]:
+def murphy(p, truth):
     """Reliability, resolution and uncertainty, grouped by what exactly was said of each place."""
     n, reliability, resolution, uncertainty = len(truth), 0.0, 0.0, 0.0
     for c in range(len(p[0])):
@@ -267,7 +225,7 @@ def murphy(p: Any, truth: Sequence[int]) -> tuple[float, float, float]:
     return reliability, resolution, uncertainty
 
 
-def kendall(true: Sequence[float], guess: Sequence[float]) -> float:
+def kendall(true, guess):
     """Kendall's tau of the pairs that differ in truth, pair by pair."""
     pairs = [(i, j) for j in range(len(true)) for i in range(j) if true[i] != true[j]]
     agree = sum((true[i] - true[j]) * (guess[i] - guess[j]) > 0 for i, j in pairs)
@@ -275,9 +233,7 @@ def kendall(true: Sequence[float], guess: Sequence[float]) -> float:
     return (agree - differ) / len(pairs) if pairs else 1.0
 
 
-def learned_stays(
-    moments: Any, length: Any, spread: Any, possible: Any, first: Any, restless: float
-) -> tuple[Any, Any, Any, Any]:
+def learned_stays(moments, length, spread, possible, first, restless):
     """The most probable transitions, as sums and quotients of whole arrays."""
     places, stages = len(possible), len(length)
     time, exits, arrivals, moves, rests = moments

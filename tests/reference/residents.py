@@ -1,12 +1,9 @@
 """Slow, obvious twin of residents: activities leg by leg of a plan, as a person does them."""
 
-from collections.abc import Sequence
 from datetime import timedelta
-from typing import Any
 
 from fleet2d._core import Bits
-from fleet2d.entities.plan import Plan
-from fleet2d.entities.users.resident import KnownHome, Seat, Spot, Venue
+from fleet2d.entities.users.resident import KnownHome, Seat, Spot
 from fleet2d.kernels import TURN, turn_between
 from fleet2d.routines.distributions import exponential
 from fleet2d.routines.planner import PLANNED, RESUMES
@@ -19,16 +16,16 @@ AnyPlace = Spot | Seat
 class SlowHome(KnownHome):
     """A home in which a person does activities by Python alone."""
 
-    def __init__(self, person: Any, actor: Any) -> None:
+    def __init__(self, person, actor):
         super().__init__(person, actor)
         self.number = -1
-        self.place: AnyPlace | None = None
-        self.base: AnyPlace | None = None
+        self.place = None
+        self.base = None
 
-    def in_core(self, name: str, venue: Venue) -> Any:
+    def in_core(self, name, venue):
         return name, venue
 
-    def live(self, plan: Plan, stints: Sequence[Any], until_us: int, *, continues: bool) -> None:
+    def live(self, plan, stints, until_us, *, continues):
         began_us = plan.time_us
         for (name, venue), number, end_us, role, stays in stints:
             if plan.time_us >= until_us:
@@ -48,9 +45,7 @@ class SlowHome(KnownHome):
             self.number = number
             plan.stay_until(end_us)
 
-    def begin(
-        self, plan: Plan, name: str, venue: Venue, role: int, stays: bool, draws: Draws
-    ) -> None:
+    def begin(self, plan, name, venue, role, stays, draws):
         self.place = None
         if role == PLANNED:
             self.base = None
@@ -66,10 +61,10 @@ class SlowHome(KnownHome):
                 self.base = self.place
         plan.note("activity", name)
 
-    def go(self, plan: Plan, activity: str, venue: Venue, draws: Draws) -> None:
+    def go(self, plan, activity, venue, draws):
         self.choose(plan, venue, draws)
 
-    def choose(self, plan: Plan, venue: Venue, draws: Draws) -> AnyPlace:
+    def choose(self, plan, venue, draws):
         """Go to where an activity is done."""
         kind, spots = venue.activity.choose, self._person.spots
         rooms, seats = venue.rooms, venue.seats
@@ -90,11 +85,11 @@ class SlowHome(KnownHome):
         self.settle(plan, venue, place)
         return place
 
-    def seats_in(self, venue: Venue, room: Any) -> list[Seat]:
+    def seats_in(self, venue, room):
         activity = venue.activity
         return self._person.spots.at_furniture(activity, (room,))
 
-    def settle(self, plan: Plan, venue: Venue, place: AnyPlace) -> None:
+    def settle(self, plan, venue, place):
         if isinstance(place, Seat):
             plan.use(*place)
         else:
@@ -102,14 +97,12 @@ class SlowHome(KnownHome):
         if venue.activity.posture != "stand":
             plan.take(venue.activity.posture)
 
-    def move_about(
-        self, plan: Plan, venue: Venue, place: AnyPlace, end_us: int, draws: Draws
-    ) -> AnyPlace:
+    def move_about(self, plan, venue, place, end_us, draws):
         """Turn, move and fetch things, each after times of its own."""
         bits, end_us, facing = Bits(draws), end_us - 90 * SECOND_US, plan.heading
         means = dict(venue.small_moves)
 
-        def wait(kind: str) -> int:
+        def wait(kind):
             return exponential(means[kind]).knots[bits.take(7)] * SECOND_US
 
         due = {kind: plan.time_us + wait(kind) for kind in means}
@@ -135,7 +128,7 @@ class SlowHome(KnownHome):
             due[kind] = plan.time_us + wait(kind)
         return place
 
-    def fetch(self, plan: Plan, venue: Venue, place: AnyPlace, end_us: int, draws: Draws) -> None:
+    def fetch(self, plan, venue, place, end_us, draws):
         if not venue.stores or venue.fetch_takes is None:
             return
         takes_us = venue.fetch_takes.draw(draws) * SECOND_US

@@ -2,15 +2,11 @@
 
 import numpy as np
 
-from fleet2d.kernels import F32, RoomMemory, ShownMemory
-
 Sighting = tuple[int, int, int]
 """Step, identity, room."""
 
 
-def memory_of(
-    sightings: list[Sighting], people: int, rooms: int, start_s: int
-) -> tuple[list, list, list]:
+def memory_of(sightings, people, rooms, start_s):
     """Return `last`, `looks` and `total` of a `RoomMemory` as lists, with steps of a second."""
     last = [[-1] * rooms for _ in range(people + 2)]
     looks = [[[0] * 24 for _ in range(rooms)] for _ in range(people + 2)]
@@ -24,9 +20,7 @@ def memory_of(
     return last, looks, total
 
 
-def shown(
-    memory: RoomMemory, columns: ShownMemory, visited: list[int], step: int, hour: int, table: F32
-) -> F32:
+def shown(memory, columns, visited, step, hour, table):
     """Return an observation with the columns that show a memory, with steps of a second."""
     table = table.copy()
     for row, at, scale in zip(*columns[:3], strict=True):

@@ -1,11 +1,8 @@
 """What an order of looks is worth, look by look."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-
-from fleet2d.entities.robots.search import SearchProblem
 
 
 class SearchOutcome(NamedTuple):
@@ -15,17 +12,17 @@ class SearchOutcome(NamedTuple):
     chance: list[float]
 
     @property
-    def cost(self) -> float:
+    def cost(self):
         """Sum of time times chance [s], by which the orders of all sites are compared."""
         return float(np.dot(self.time, self.chance))
 
     @property
-    def success(self) -> float:
+    def success(self):
         """Probability that the target is found at all."""
         return sum(self.chance)
 
 
-def play(problem: SearchProblem, order: Sequence[int]) -> SearchOutcome:
+def play(problem, order):
     """Return the outcome of an order, in which a site may be several times."""
     undetected = problem.prior.copy()  # the target is at the site, and no look has found it
     now = 0.0

@@ -11,15 +11,13 @@ from fleet2d.floorplan.rooms.shape import (
     FINE,
     LONG,
     SMOOTHED_M,
-    Limits,
     without_furniture,
 )
-from fleet2d.kernels import I64
 
 Cell = tuple[int, int]
 
 
-def parts_by_shape(room_of_cell: I64, cell: float, limits: Limits) -> set[frozenset[Cell]]:
+def parts_by_shape(room_of_cell, cell, limits):
     """Walk up from every cell, then join the parts most open to each other, pair by pair."""
     rooms = cells_of(room_of_cell)
     space = cells_of(without_furniture(room_of_cell.astype(np.int32), cell).astype(np.int64))
@@ -29,7 +27,7 @@ def parts_by_shape(room_of_cell: I64, cell: float, limits: Limits) -> set[frozen
     scale = FINE * (2 * reach + 1) ** 2
     part |= arms(part, height, cell, scale)
     while True:
-        passes: dict[tuple[Cell, Cell], int] = {}
+        passes = {}
         for (row, column), top in part.items():
             for beside in ((row, column + 1), (row + 1, column)):
                 if part.get(beside, top) != top and rooms[beside] == rooms[row, column]:
@@ -53,11 +51,9 @@ def parts_by_shape(room_of_cell: I64, cell: float, limits: Limits) -> set[frozen
         part = {at: kept if top == lost else top for at, top in part.items()}
 
 
-def arms(
-    part: dict[Cell, Cell], height: dict[Cell, int], cell: float, scale: int
-) -> dict[Cell, Cell]:
+def arms(part, height, cell, scale):
     """Return the arms of the parts, numbered after all other parts."""
-    found: dict[Cell, Cell] = {}
+    found = {}
     for top in sorted(set(part.values())):
         inside = [at for at in part if part[at] == top]
         least = int(ARM_SHARE * max(1, *(height[at] for at in inside)))
@@ -82,13 +78,13 @@ def arms(
     return found
 
 
-def cells_of(labels: I64) -> dict[Cell, int]:
+def cells_of(labels):
     return {
         (row, column): int(label) for (row, column), label in np.ndenumerate(labels) if label >= 0
     }
 
 
-def heights(space: dict[Cell, int], rooms: dict[Cell, int], reach: int) -> dict[Cell, int]:
+def heights(space, rooms, reach):
     """Measure the distance to each place outside, and weigh what lies around each cell."""
     inside = {
         (row, column)
@@ -114,7 +110,7 @@ def heights(space: dict[Cell, int], rooms: dict[Cell, int], reach: int) -> dict[
     }
 
 
-def top_above(at: Cell, rooms: dict[Cell, int], height: dict[Cell, int]) -> Cell:
+def top_above(at, rooms, height):
     while True:
         row, column = at
         sides = ((row, column + 1), (row + 1, column), (row, column - 1), (row - 1, column))

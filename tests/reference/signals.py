@@ -1,6 +1,5 @@
 """Distances, speeds and windows over time, step by step, in slow and obvious Python."""
 
-from collections.abc import Sequence
 from math import inf, sqrt
 
 Edge = tuple[int, int, int, int]
@@ -10,14 +9,14 @@ Portal = tuple[int, int, int, int, int]
 """The x and y of its ends, and how far from them bodies stand."""
 
 
-def distance(one: Pose, other: Pose) -> float:
+def distance(one, other):
     """Return how far two bodies are apart."""
     if one[2] or other[2]:
         return inf
     return sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2)
 
 
-def distance_to_shape(pose: Pose, edges: Sequence[Edge]) -> float:
+def distance_to_shape(pose, edges):
     """Return how far a body is from a shape, 0 inside its rings."""
     x, y, away = pose
     if away:
@@ -31,7 +30,7 @@ def distance_to_shape(pose: Pose, edges: Sequence[Edge]) -> float:
     return min((_to_edge(x, y, edge) for edge in edges), default=inf)
 
 
-def _to_edge(x: int, y: int, edge: Edge) -> float:
+def _to_edge(x, y, edge):
     x0, y0, x1, y1 = edge
     squared = (x1 - x0) ** 2 + (y1 - y0) ** 2
     share = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / squared if squared else 0.0
@@ -39,14 +38,14 @@ def _to_edge(x: int, y: int, edge: Edge) -> float:
     return sqrt((x - x0 - share * (x1 - x0)) ** 2 + (y - y0 - share * (y1 - y0)) ** 2)
 
 
-def speed(poses: Sequence[Pose], step: int, portals: Sequence[Portal] = ()) -> float:
+def speed(poses, step, portals=()):
     """Return how far a body came in a step."""
     if not step or poses[step][2] or poses[step - 1][2]:
         return 0.0
     return move_length(poses[step - 1], poses[step], portals)
 
 
-def move_length(begin: Pose, end: Pose, portals: Sequence[Portal]) -> float:
+def move_length(begin, end, portals):
     """Return the length of a move, which may be through a portal from the one to the other end."""
     lengths = [distance(begin, end)]
     for x0, y0, x1, y1, reach in portals:
@@ -57,18 +56,16 @@ def move_length(begin: Pose, end: Pose, portals: Sequence[Portal]) -> float:
     return min(lengths)
 
 
-def sliding_max(
-    values: Sequence[float], low: int, high: int, before: float, after: float
-) -> list[float]:
+def sliding_max(values, low, high, before, after):
     """Return the maximum from `low` to `high` steps after each step."""
 
-    def at(step: int) -> float:
+    def at(step):
         return before if step < 0 else after if step >= len(values) else values[step]
 
     return [max(at(t) for t in range(step + low, step + high + 1)) for step in range(len(values))]
 
 
-def until(hold: Sequence[float], goal: Sequence[float], after: float) -> list[float]:
+def until(hold, goal, after):
     """Return how well one holds until the other does: by all steps at which it may."""
     count = len(hold)
     best = []

@@ -1,14 +1,13 @@
 """Slow twin of the traces of evidence, and of the network over places."""
 
 import math
-from typing import Any
 
 import numpy as np
 
 CAP = 2880.0
 
 
-def since(time: float, before: float) -> float:
+def since(time, before):
     """Return the minutes since an earlier time that count; none where a clock was put back."""
     return min(max(time - before, 0.0), CAP)
 
@@ -16,10 +15,10 @@ def since(time: float, before: float) -> float:
 class Traces:
     """What the evidence of one person leaves behind in each room."""
 
-    def __init__(self, rooms: int) -> None:
+    def __init__(self, rooms):
         """Begin without evidence."""
         self.rooms = rooms
-        self.first: float | None = None
+        self.first = None
         self.last, self.last_time = -1, -1e9
         self.seen_at, self.looked_at = [-1e9] * rooms, [-1e9] * rooms
         self.most, self.sum = [0.0] * rooms, [0.0] * rooms
@@ -29,9 +28,7 @@ class Traces:
         self.moves = [[0.0] * rooms for _ in range(rooms)]
         self.gone, self.bins = [0] * 24, [0] * 24
 
-    def add(
-        self, home: Any, day: int, minute: int, watched: Any, seen: Any, unknown: Any, belief: Any
-    ) -> list[list[float]]:
+    def add(self, home, day, minute, watched, seen, unknown, belief):
         """Add a bin; return a row of features for each room, and last for away."""
         time, hour, rooms = day * 1440.0 + minute, minute // 60, range(self.rooms)
         self.first = time if self.first is None else self.first
@@ -56,7 +53,7 @@ class Traces:
         self.bins[hour] += 1
         return self._rows(home, hour, time, gap, cover, watched, seen, unknown, belief)
 
-    def _rows(self, home: Any, hour: int, time: float, *rest: Any) -> list[list[float]]:
+    def _rows(self, home, hour, time, *rest):
         gap, cover, watched, seen, unknown, belief = rest
         rooms = range(self.rooms)
         total = [sum(self.seen[h][r] for h in range(24)) for r in rooms]
@@ -107,7 +104,7 @@ class Traces:
         ]
 
 
-def place_probabilities(network: Any, places: Any, features: Any) -> Any:
+def place_probabilities(network, places, features):
     """Return the probability of each place, by matrix products."""
     inner = np.maximum(features @ network.first + places, 0)
     context = inner.mean(axis=1) @ network.context + network.bias

@@ -3,10 +3,8 @@
 import numpy as np
 from tests.reference.line_of_sight import visible
 
-from fleet2d.kernels import I64, Bool
 
-
-def half_planes(heading: int, half_angle: int, away: I64, sines: I64) -> Bool:
+def half_planes(heading, half_angle, away, sines):
     """Return which vectors (n, 2) lie within `half_angle` [1/8192 turn] of a heading, or on it.
 
     The borders are those of a table of sines over a whole turn at that resolution.
@@ -21,14 +19,14 @@ def half_planes(heading: int, half_angle: int, away: I64, sines: I64) -> Bool:
 
 
 def cells_in_view(
-    walls: I64,
-    shape: tuple[int, int],
-    pose: tuple[int, int, int],
-    near: int,
-    far: int,
-    half_angle: int,
-    sines: I64,
-) -> Bool:
+    walls,
+    shape,
+    pose,
+    near,
+    far,
+    half_angle,
+    sines,
+):
     """Return bool (rows, columns): the cells whose centre is in view of (x, y, heading)."""
     x, y, heading = pose
     rows, columns = np.indices(shape)

@@ -1,26 +1,25 @@
 """Sightings of one camera, made for tests of errors of perception."""
 
 from datetime import datetime
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fleet2d import CameraSightings, Home
 from fleet2d.sight.perception_error import ErrorStream
 
 
 def sightings(
-    x: ArrayLike,
-    y: ArrayLike,
-    camera: tuple[float, float] = (0.0, 0.0),
-    seed: int = 1,
-    name: str = "camera: errors.e",
-    **columns: ArrayLike,
-) -> CameraSightings:
+    x,
+    y,
+    camera=(0.0, 0.0),
+    seed=1,
+    name="camera: errors.e",
+    **columns,
+):
     """Return sightings of ana at places [m], one a step, that are true but for some columns."""
     count = len(np.asarray(x))
-    zeros: dict[str, Any] = {
+    zeros = {
         "step": np.arange(count),
         "true_user": np.zeros(count, np.int64),
         "user": np.zeros(count, np.int64),

@@ -1,7 +1,5 @@
 """The kernel's tables hold what the settings say, at the entry at which the kernel looks it up."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.sight.watching import LATTICE, UNITS_PER_M, scene
@@ -14,15 +12,13 @@ from fleet2d.sight.perception import Perception
 USERS = ("ana", "ben", "cleo")
 
 
-def tables(
-    perception: dict[str, Any], users: tuple[str, ...] = USERS, **camera: Any
-) -> k.ErrorTables:
+def tables(perception, users=USERS, **camera):
     """Return the tables of one camera."""
     lens = Camera.model_validate(camera).lens(UNITS_PER_M, 10**6)
     return error_tables([lens], [Perception.model_validate(perception)], scene(users))
 
 
-def shares(error_tables: k.ErrorTables, begin: int, count: int) -> Any:
+def shares(error_tables, begin, count):
     return error_tables.table[0, begin : begin + count] / k.ONE
 
 

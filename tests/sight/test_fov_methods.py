@@ -2,7 +2,6 @@
 
 import gc
 import tracemalloc
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from fleet2d.errors import InputError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
-from fleet2d.kernels import SUB, Bool, Reach
+from fleet2d.kernels import SUB, Reach
 from fleet2d.sight import cached_fov
 from fleet2d.sight.cached_fov import Flashlight, VisibilityPolygon
 from fleet2d.sight.fov import FieldOfView, LineOfSight
@@ -28,7 +27,7 @@ def home():
     return Home(fleet2d.load_floorplan(flat_path()))
 
 
-def exact_methods() -> list[FieldOfView]:
+def exact_methods():
     """The methods that answer for any point."""
     return [
         LineOfSight(),
@@ -38,7 +37,7 @@ def exact_methods() -> list[FieldOfView]:
     ]
 
 
-def some_poses(home: Home, count: int) -> list[tuple[int, int, int]]:
+def some_poses(home, count):
     """Poses at the centres of cells, beside them, in walls and outside."""
     rng = np.random.default_rng(5)
     cells = np.argwhere(home.plan.free)
@@ -50,7 +49,7 @@ def some_poses(home: Home, count: int) -> list[tuple[int, int, int]]:
     return [*poses, (0, 0, 0), (-5, 9, 100)]
 
 
-def some_reaches() -> list[Reach]:
+def some_reaches():
     return [Reach(0, 3000**2, 1229), Reach(200**2, 6000**2, 3000), Reach(0, 10**10, 4096)]
 
 
@@ -109,7 +108,7 @@ def test_every_method_follows_a_door():
     )
     plan = FloorPlan.build("two", free, doorways=[DoorLine((2.05, 1.0), (2.05, 1.9))])
     home = Home(plan, plan.doorways)
-    methods: list[FieldOfView] = [
+    methods = [
         LineOfSight(), VisibilityPolygon(), VisibilityPolygon(precompute="all"), Flashlight(),
     ]  # fmt: skip
     (eye, point) = plan.lattice.to_lattice([(1.025, 1.425), (3.025, 1.475)]) // SUB * SUB + 33
@@ -137,7 +136,7 @@ def test_wrong_method_is_an_error_that_names_the_key(settings, why):
 class XRay(FieldOfView):
     """A user's own method, for which walls don't count."""
 
-    def visible(self, home: Home, x: int, y: int, points: Any) -> Bool:
+    def visible(self, home, x, y, points):
         return np.ones(len(points), np.bool_)
 
 

@@ -3,15 +3,11 @@
 Each `agree` fails a true model in one of 150,000 cases; draws are seeded, so none does by chance.
 """
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 import pytest
 import shapely
 from tests.sight.watching import PILLAR, SIDE_M, UNITS_PER_M, Watch, agree, around, changed, hall
 
-from fleet2d.kernels import F64, I64, Bool
 from fleet2d.kernels import SightingColumn as Column
 
 N = 60_000
@@ -21,7 +17,7 @@ BEARING = RNG.uniform(-180, 180, N)
 FACING = RNG.uniform(-180, 180, N)
 
 
-def noticed(watch: Watch, user: int = 0) -> Bool:
+def noticed(watch, user=0):
     """Return for each step whether a user is noticed."""
     rows = watch.look()
     result = np.zeros(watch.users.shape[1], bool)
@@ -29,7 +25,7 @@ def noticed(watch: Watch, user: int = 0) -> Bool:
     return result
 
 
-def check_by(values: F64, edges: npt.ArrayLike, hits: Bool, expected: F64) -> None:
+def check_by(values, edges, hits, expected):
     """Check rates in each bin of a quantity."""
     group = np.digitize(values, np.asarray(edges))
     for g in np.unique(group):
@@ -230,7 +226,7 @@ def test_misses_of_two_users_are_independent():
 NOBODY_THERE = around(np.full(N, 9.9), np.zeros(N))
 
 
-def ghosts(**more: Any) -> I64:
+def ghosts(**more):
     """Return the false positives of a camera that sees up to 3 m, in a hall with nobody near."""
     camera = {"range": [1, 3], "angle_deg": 120, **more.pop("camera", {})}
     rows = Watch(NOBODY_THERE, camera=camera, **more).look()
@@ -362,7 +358,7 @@ def test_an_identity_lasts_as_long_as_its_track():
 # --- Where, and how -------------------------------------------------------------------------------
 
 
-def polar(rows: I64) -> tuple[F64, F64, F64]:
+def polar(rows):
     """Return true distance [m], and the errors in distance [m] and bearing [deg]."""
     eye = SIDE_M / 2
     true, perceived = (
@@ -378,7 +374,7 @@ def polar(rows: I64) -> tuple[F64, F64, F64]:
     return distance, np.hypot(*perceived.T) - distance, turn
 
 
-def check_noise(values: F64, std: F64 | float) -> None:
+def check_noise(values, std):
     """Check that values are bell-shaped noise of a standard deviation, without a bias."""
     z = values / std
     n = len(z)

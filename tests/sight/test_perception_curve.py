@@ -18,7 +18,7 @@ SHARE = st.floats(0, 1)
 PLACES = st.lists(st.floats(-50, 50), min_size=1, max_size=6, unique=True).map(sorted)
 
 
-def line(rows: list[tuple[float, float]], x: float) -> Fraction:
+def line(rows, x):
     """Return a table's value at x: level outside, straight between two rows."""
     if x <= rows[0][0]:
         return Fraction(rows[0][1])

@@ -1,7 +1,6 @@
 """Errors of perception in a scenario: their names, types and keys, and whose they may be."""
 
 from importlib.metadata import EntryPoint, EntryPoints
-from typing import Any
 
 import jsonschema
 import pytest
@@ -16,12 +15,12 @@ from fleet2d.sight.built_in_errors import Outliers
 ERRORS = OWN.replace("own_components", "own_errors")
 
 
-def content(errors: Any, **robot: Any) -> dict[str, Any]:
+def content(errors, **robot):
     """Return a scenario with a robot that has these errors."""
     return scenario(robots={"astro": {"perception": {"errors": errors}, **robot}})
 
 
-def errors_of(*arguments: Any) -> dict[str, Any]:
+def errors_of(*arguments):
     """Return the errors of the robot in a loaded scenario."""
     perception = fleet2d.load_scenario(*arguments).robots["astro"].perception
     assert perception is not None

@@ -9,7 +9,7 @@ from fleet2d.sight.built_in_errors import Outliers
 MANY = 20_000
 
 
-def errors(outliers: Outliers) -> np.ndarray:
+def errors(outliers):
     """Return the errors in distance of many looks, one a step, at somebody 50 m away."""
     seen = sightings(x=np.full(MANY, 50.0), y=np.zeros(MANY), camera=(0.0, 0.0))
     off = outliers.distort(seen)

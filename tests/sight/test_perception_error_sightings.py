@@ -78,7 +78,7 @@ def test_who_is_at_the_camera_stays_there():
 )
 def test_wrong_values_are_refused(change, message):
     with pytest.raises(fleet2d.ComponentError, match=message):
-        sightings(AT, AT).replace(**change)  # type: ignore[arg-type]
+        sightings(AT, AT).replace(**change)
 
 
 def test_draws_are_addressed_by_purpose_person_step_and_error():
@@ -130,7 +130,7 @@ def test_bell_shaped_draws_are_those_of_the_core():
 
 def test_a_class_without_distort_is_refused():
     with pytest.raises(TypeError, match="distort"):
-        PerceptionError()  # type: ignore[abstract]
+        PerceptionError()
 
 
 def test_hour_is_the_time_of_day_also_after_midnight():

@@ -1,7 +1,5 @@
 """Pets and people that are taken for others, each at a rate of its own."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -15,7 +13,7 @@ from fleet2d.sight.built_in_errors import TakenFor
 MANY = 20_000
 
 
-def taken(user: int, **fields: Any) -> np.ndarray:
+def taken(user, **fields):
     """Whom many sightings of a user, one a second, are recognized as."""
     who = np.full(MANY, user)
     seen = sightings(np.full(MANY, 2.0), np.zeros(MANY), user=who, true_user=who)
@@ -66,7 +64,7 @@ def test_what_says_nothing_is_refused(users, words):
         TakenFor.model_validate({"users": users})
 
 
-def home(users: dict[str, Any]) -> dict[str, Any]:
+def home(users):
     return {
         "simulation": {"start": "2026-01-05T08:00", "duration": "3 h", "seed": 4},
         "floorplan": "bundled",

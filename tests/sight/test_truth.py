@@ -5,14 +5,11 @@ from an independent exact line of sight in NumPy.
 """
 
 import json
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
-from tests.meshed_homes import SUB, Home, home_of
+from tests.meshed_homes import SUB, home_of
 
 from fleet2d.floorplan.mesh import snap_polygon
 from fleet2d.kernels import line_of_sight, locate, region_outline, visible_region
@@ -21,7 +18,7 @@ from fleet2d.kernels import line_of_sight, locate, region_outline, visible_regio
 MARGIN_PX = 1
 
 
-def truths(shared_data: Path) -> Iterator[tuple[dict[str, Any], Home]]:
+def truths(shared_data):
     """Yield each truth file, and its home: a pixel is 64 lattice units."""
     paths = sorted((shared_data / "truth").glob("truth_*.json"))
     assert len(paths) == 3
@@ -30,12 +27,12 @@ def truths(shared_data: Path) -> Iterator[tuple[dict[str, Any], Home]]:
         yield truth, home_of(snap_polygon(Polygon(SUB * np.array(truth["fp_polygon_px"]))).polygons)
 
 
-def lattice(x: float, y: float) -> tuple[int, int]:
+def lattice(x, y):
     """Return the lattice point of a position in pixels."""
     return round(x * SUB), round(y * SUB)
 
 
-def area_px2(home: Home, x: int, y: int) -> float:
+def area_px2(home, x, y):
     """Return the area visible from a lattice point, in square pixels; 0 in a wall."""
     _, area = region_outline(home.mesh, x, y, *visible_region(home.mesh, x, y))
     return area / SUB**2

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from tests.meshed_homes import home_of
 
@@ -15,7 +14,6 @@ from fleet2d.floorplan.lattice import Lattice
 from fleet2d.kernels import (
     F64,
     I8,
-    I64,
     MAX_GHOSTS,
     DetectionRule,
     Mesh,
@@ -34,7 +32,7 @@ LATTICE = Lattice(cell=0.05, origin=(0.0, 0.0), columns=400, rows=400)
 PILLAR = shapely.box(12, 10.3, 12.5, 11.5)
 
 
-def hall(*pillars: shapely.Polygon) -> Mesh:
+def hall(*pillars):
     """Return a hall of 20 m by 20 m, with pillars [m]."""
     space = shapely.box(0, 0, SIDE_M, SIDE_M).difference(shapely.union_all(pillars))
     return home_of([shapely.transform(space, lambda xy: np.rint(xy * UNITS_PER_M))]).mesh
@@ -43,7 +41,7 @@ def hall(*pillars: shapely.Polygon) -> Mesh:
 HALL = hall()
 
 
-def scene(users: Sequence[str] = ("ana", "ben", "cleo"), step_us: int = 10**6) -> TableContext:
+def scene(users=("ana", "ben", "cleo"), step_us=10**6):
     """Return the scene of users of 20 cm."""
     return TableContext(users, [0.2 * UNITS_PER_M] * len(users), LATTICE, step_us, "robots.r")
 
@@ -69,7 +67,7 @@ class Watch:
     radius: float = 0.2
     memory: SightMemory | None = None
 
-    def look(self) -> I64:
+    def look(self):
         """Return all sightings, a row each."""
         count, steps = self.users.shape[:2]
         camera = Camera.model_validate(
@@ -108,13 +106,13 @@ class Watch:
         return SightingTable(step, index, distinct.T).rows()
 
 
-def _lattice(poses: F64) -> list[I64]:
+def _lattice(poses):
     """Return x, y and heading as the kernels have them."""
     x, y = (np.rint(poses[..., i] * UNITS_PER_M).astype(np.int64) for i in (0, 1))
     return [x, y, np.rint(poses[..., 2] / 360 * 4096).astype(np.int64) % 4096]
 
 
-def around(distance: F64, bearing_deg: F64, facing_deg: F64 | float = 0.0) -> F64:
+def around(distance, bearing_deg, facing_deg=0.0):
     """Return poses (1, n, 3) of a user at distances and bearings from the middle of the hall."""
     angle = np.deg2rad(bearing_deg)
     x = SIDE_M / 2 + distance * np.cos(angle)
@@ -122,7 +120,7 @@ def around(distance: F64, bearing_deg: F64, facing_deg: F64 | float = 0.0) -> F6
     return np.stack([x, y, np.broadcast_to(facing_deg, x.shape)], axis=-1)[None]
 
 
-def agree(hits: npt.NDArray[Any], expected: npt.ArrayLike, z: float = 4.5) -> bool:
+def agree(hits, expected, z=4.5):
     """Return whether independent yes/no outcomes happen as often as their probabilities say.
 
     A true model fails in one of 150,000 cases (4.5 standard deviations of the binomial).
@@ -133,6 +131,6 @@ def agree(hits: npt.NDArray[Any], expected: npt.ArrayLike, z: float = 4.5) -> bo
     return bool(abs(hits.sum() - p.sum()) <= z * spread + 0.5 + 1e-3 * p.sum())
 
 
-def changed(watch: Watch, **changes: Any) -> Watch:
+def changed(watch, **changes):
     """Return the same with changes, and nothing remembered."""
     return dataclasses.replace(watch, memory=None, **changes)
