@@ -1,7 +1,6 @@
 """The charge of a battery along tracks: the core against plain Python, rate by rate."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference import battery as slow
@@ -59,26 +58,3 @@ def test_charge_rises_to_full_only_at_a_charger_that_works():
 
     assert [1.0, 0.0] == levels
     assert charge_falls_to(track, battery(0.5), 0.4) is None
-
-
-@pytest.mark.parametrize(
-    "state",
-    [
-        battery(1.5),
-        battery(float("nan")),
-        battery(0.5)._replace(driving=0.0),
-        battery(0.5)._replace(charging=float("nan")),
-    ],
-)
-def test_impossible_battery_is_refused(state):
-    with pytest.raises(ValueError, match="must be"):
-        charge_at(track_of([(0, 0, 0, 0)]), state, 0)
-
-
-def test_a_track_whose_arrays_differ_in_length_is_refused():
-    """A damaged call read headings behind the end of their array."""
-    track = track_of([(10, 100, 0, 0)])
-    for field in ("x", "y", "heading", "away"):
-        damaged = track._replace(**{field: getattr(track, field)[:0]})
-        with pytest.raises(ValueError, match="its arrays have one length"):
-            charge_falls_to(damaged, battery(0.5), 0.1)

@@ -127,26 +127,3 @@ def test_copies_go_on_by_themselves():
 
     assert [1, 1, 2] == [len(each) for each in (*twins, legs)]
     assert [[1, 2, 3, 4, 0]] == twins[1].rows().tolist()
-
-
-def test_wrong_numbers_are_refused():
-    legs = Legs()
-    for row in ((2**62, 0, 0, 0, 0), (0, 2**30, 0, 0, 0), (0, 0, 0, 0, 2)):
-        with pytest.raises(ValueError, match="must be"):
-            legs.mark(*row)
-        with pytest.raises(ValueError, match="must be"):
-            legs.add(np.array([row]))
-    with pytest.raises(ValueError, match="turn_rate"):
-        legs.turn(0, 0, 0, 0, 0, 5, 0.0)
-    with pytest.raises(ValueError, match="route"):
-        legs.walk(0, 0, np.zeros((0, 2), np.int64), 1.0, 1.0)
-    with pytest.raises(ValueError, match="speed"):
-        legs.settle(0, 0, 0, 0, 9, 9, 0, 0.0, 1.0)
-    with pytest.raises(ValueError, match="pose"):
-        legs.settle(0, 0, 0, 0, 2**40, 9, 0, 1.0, 1.0)
-    routes = routes_of(home_of([ROOM]))
-    with pytest.raises(ValueError, match="speed"):
-        legs.go(0, 33, 33, 0, routes, 99, 99, -1.0, 1.0)
-    assert legs.go(0, 33, 33, 0, routes, 2**40, 9, 1.0, 1.0) is None
-
-    assert len(legs) == 0

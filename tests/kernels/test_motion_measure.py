@@ -3,7 +3,6 @@
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference import signals as slow
@@ -51,12 +50,3 @@ def test_steps_together_equal_a_loop_over_all_steps(rooms):
     one, other = rooms
     expected = sum(a == b >= 0 for a, b in zip(one, other, strict=True))
     assert expected == count_together(*visits(one), *visits(other), len(one))
-
-
-@pytest.mark.parametrize("begin", [[], [1], [0, 2, 2], [0, 3, 1], [0, 9]])
-def test_visits_that_do_not_make_up_all_steps_are_refused(begin):
-    good = np.array([0], np.int64), np.array([1], np.int16)
-    wrong = np.array(begin, np.int64), np.ones(len(begin), np.int16)
-    for pair in ((wrong, good), (good, wrong)):
-        with pytest.raises(ValueError, match="must ascend from 0"):
-            count_together(*pair[0], *pair[1], 9)

@@ -175,49 +175,6 @@ def test_nothing_is_fetched_without_time_to_wait_and_return(wait_us, more_us, wa
     assert walks == len(walks_of([(fetches, 0, end_us, 0, False)], wait=wait_us))
 
 
-@pytest.mark.parametrize(
-    ("place", "value", "message"),
-    [
-        (3, 4, "choose must be 0 to 3"),
-        (4, -1, "postures must be 0 to 127"),
-        (8, [(3, WAITS)], "kinds of moves must be 0 to 2"),
-        (8, [(1, WAITS), (0, WAITS)], "turns come before other moves"),
-        (8, [(1, WAITS)] * 4, "three kinds of small moves"),
-        (2, True, "makes no small moves"),
-        (9, ([9, 8], 0, 0, 0, 0), "quantiles must ascend"),
-        (9, ([-5, 8], -5, 8, 0, 1), "must take 0 s or more"),
-    ],
-)
-def test_wrong_scenes_are_refused(place, value, message):
-    with pytest.raises(ValueError, match=message):
-        CoreVenue(*VENUE[:place], value, *VENUE[place + 1 :])
-
-
-@pytest.mark.parametrize("waits", [[], [0], [0, 0], [1, 2, 3], [-1, 5], [2**61]])
-def test_wrong_waits_are_refused(waits):
-    with pytest.raises(ValueError, match="waits must be a power of two"):
-        Waits(np.array(waits, np.int64))
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"number": -1}, "numbers of stints"),
-        ({"end": 2**38}, "stints must end within"),
-        ({"role": 4}, "roles must be 0 to 3"),
-        ({"now": (0, 2**30, 0, 0, 0)}, "a pose must be within"),
-        ({"posture": 128}, "postures must be 0 to 127"),
-        ({"home": Room(spots=[])}, "a room must have a spot"),
-        ({"home": Room(spots=[(2**30, 0)])}, "a pose must be within"),
-        ({"walk": lambda *_: ((0, 0, 0, 0, 2), 0)}, "away must be 0 or 1"),
-        ({"walk": lambda *_: ((0, 0, 0, 0, 0), -1)}, "postures must be 0 to 127"),
-    ],
-)
-def test_wrong_stints_and_answers_are_refused(changes, message):
-    with pytest.raises(ValueError, match=message):
-        live(**changes)
-
-
 def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known():
     last = LastStint()
     live(last=last)
@@ -232,10 +189,3 @@ def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known():
     assert (0, (-1, 5, 5), (-1, 5, 5)) == before
     assert (0, None, None) == last.__getstate__()
     assert live(last=last)[0] == (1000, 5, 5, 0, 0)
-
-
-def test_wrong_rates_and_steps_are_refused():
-    with pytest.raises(ValueError, match="speed and turn_rate"):
-        Resident(1, 0.0, 1.0, None, [])
-    with pytest.raises(ValueError, match="a pose must be within"):
-        Resident(1, 1.0, 1.0, None, [(0, 0, 2**30, 0)])

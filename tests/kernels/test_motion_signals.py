@@ -107,18 +107,3 @@ def test_until_is_the_best_of_all_steps_to_wait_for(pairs, after):
     steps = np.arange(len(pairs))
     result = until(steps, np.array(hold), np.array(goal), after)
     assert slow.until(hold, goal, after) == dense(result, len(pairs))
-
-
-def test_wrong_stretches_are_refused():
-    start, numbers = np.array([0, 2], np.int64), np.array([1.0, 2.0])
-    with pytest.raises(ValueError, match="ascend"):
-        sliding_max(start[::-1].copy(), numbers, 5, 0, 1, 0.0, 0.0)
-    with pytest.raises(ValueError, match="before end"):
-        sliding_max(start, numbers, 2, 0, 1, 0.0, 0.0)
-    with pytest.raises(ValueError, match="numbers"):
-        until(start, numbers, np.array([1.0, np.nan]), 0.0)
-    with pytest.raises(ValueError, match="low"):
-        sliding_max(start, numbers, 5, 2, 1, 0.0, 0.0)
-    window = timelines_of([[(1, 0, 0, False)]]).window(0, 4)
-    with pytest.raises(ValueError, match="no such body"):
-        distances_between(window, 0, 1)

@@ -1,6 +1,5 @@
 """Poses over time against fractions, and the random walk against a look at every wall."""
 
-import math
 from fractions import Fraction
 from itertools import islice, pairwise
 
@@ -154,26 +153,6 @@ def test_trace_track_rounds_halves_up(start, change, whole, step):
         assert twin(track, begin, step, 60) == traced(track, begin, step, 60)
 
 
-KNOWN = Breakpoints(*(np.array([0, 5, 9]) for _ in range(4)), np.zeros(3, np.uint8))
-
-
-@pytest.mark.parametrize(
-    ("track", "step", "message"),
-    [
-        pytest.param(KNOWN._replace(x=np.zeros(2, np.int64)), 1, "one length", id="lengths"),
-        pytest.param(Breakpoints(*(a[:0] for a in KNOWN)), 1, "1 or more", id="empty"),
-        pytest.param(KNOWN._replace(time=np.array([0, 9, 5])), 3, "ascend", id="backwards"),
-        pytest.param(KNOWN._replace(x=np.array([0, 2**41, 0])), 3, "small", id="far"),
-        pytest.param(KNOWN._replace(time=KNOWN.time << 57), 3, "short", id="long"),
-        pytest.param(KNOWN, 0, "step", id="no-step"),
-        pytest.param(KNOWN, 1 << 60, "step", id="beyond-all-time"),
-    ],
-)
-def test_trace_track_refuses_invalid_input(track, step, message):
-    with pytest.raises(ValueError, match=message):
-        trace_track(track, 0, step, poses(4))
-
-
 def timed(route, speed, rate, heading=0):
     """Return the breakpoints of a route that begins at 1 s."""
     return time_route(np.array(route, np.int64), 1_000_000, heading, speed, rate)
@@ -242,12 +221,6 @@ def test_time_route_rounds_every_time_up():
     rows = timed([(0, 0), (0, 1)], 3.0, 3000.0)
 
     assert [1_000_000, 1_341_334, 1_674_668] == rows[:, 0].tolist()
-
-
-@pytest.mark.parametrize(("speed", "rate"), [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (math.nan, 1.0)])
-def test_time_route_refuses_speeds_that_lead_nowhere(speed, rate):
-    with pytest.raises(ValueError, match="above 0"):
-        timed([(0, 0), (5, 5)], speed, rate)
 
 
 def test_endless_time_route_ends_at_the_last_possible_time():
@@ -401,14 +374,3 @@ def test_trace_meander_turns_no_faster_than_the_limit(limit):
     turns = (np.diff(steps[:, 2]) + 2048) % TURN - 2048
 
     assert {limit} == set(np.abs(turns).tolist()) - {0}.difference({limit})
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"stride": -1}, {"stride": 2**31}, {"sway": -1}, {"turn_limit": -1}]
-)
-def test_trace_meander_refuses_a_rule_that_is_none(wrong):
-    home = home_of([shapely.box(0, 0, 640, 640)])
-    rule = WalkRule(np.uint64(1), 5, 5, 5)._replace(**wrong)
-
-    with pytest.raises(ValueError, match=next(iter(wrong))):
-        walked(home, home, rule, 0, np.array([33, 33, 0]), 3)

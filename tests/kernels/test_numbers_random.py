@@ -163,17 +163,6 @@ def test_bits_and_others_share_the_draws_of_a_step():
     assert [all_of_them.below(1 << 30) for _ in range(3)] == values
 
 
-@pytest.mark.parametrize("bound", [0, -1, 2**31, 2**62])
-def test_a_bound_out_of_range_is_refused(bound):
-    with pytest.raises(ValueError, match=f"bound is {bound}: it must be from 1 to"):
-        StepDraws(np.uint64(3), 5).below(bound)
-
-
-def test_more_than_30_bits_are_refused():
-    with pytest.raises(ValueError, match="count must be 0 to 30"):
-        Bits(StepDraws(np.uint64(3), 5)).take(31)
-
-
 @pytest.mark.parametrize("way", [copy.copy, lambda draws: pickle.loads(pickle.dumps(draws))])
 def test_a_copy_of_draws_is_independent(way):
     draws = StepDraws(np.uint64(3), 5)

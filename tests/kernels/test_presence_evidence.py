@@ -117,39 +117,3 @@ def test_sums_by_hour_equal_numpy(users, longest):
     assert np.array_equal(expected, result)
     for sums, (a, b) in zip(result, pairwise([0, *ends.tolist()]), strict=True):
         assert (sums[:, -1] == b - a).all()
-
-
-def test_wrong_sizes_are_refused():
-    chain, unknown = (np.full((2, 3), 1 / 3), np.array([3, 1])), np.zeros((4, 2), bool)
-    chains = together([chain, chain])
-    with pytest.raises(ValueError, match="no users"):
-        sum_places(chains, unknown, 3, np.array([0]))
-    wrong = (
-        chains._replace(probability=chains.probability[:, :2]),
-        chains._replace(bins=np.array([3, 1, 4, 0])),
-        chains._replace(begin=np.array([0, 1, 4])),
-    )
-    for other in wrong:
-        with pytest.raises(ValueError, match="a chain must be"):
-            sum_places(other, unknown, 2, np.array([0]))
-    for other in (
-        chains._replace(probability=chains.probability[:3]),
-        chains._replace(begin=np.array([0, 3, 2])),
-        chains._replace(begin=np.array([0, 2, 5])),
-    ):
-        with pytest.raises(ValueError, match="chains must be"):
-            sum_places(other, unknown, 2, np.array([0]))
-    with pytest.raises(ValueError, match="a chain must be"):
-        sum_places(chains, unknown[:3], 2, np.array([0]))
-    for first in ([1], [0, 0], [0, 4]):
-        with pytest.raises(ValueError, match="ascend"):
-            sum_places(chains, unknown, 2, np.array(first))
-    cells, room, size = np.zeros((2, 1, 2, 3), np.int64), np.array([0, 0, 1]), np.array([1, 1, 1])
-    with pytest.raises(ValueError, match="rooms of patches"):
-        gather_views(cells, room[::-1].copy(), size, size[:2], 60)
-    with pytest.raises(ValueError, match="rooms of patches"):
-        gather_views(cells, room, size, size, 60)
-    with pytest.raises(ValueError, match="cells must be"):
-        gather_views(cells, room[:2], size, size[:2], 60)
-    with pytest.raises(ValueError, match="not be empty"):
-        gather_views(cells, room, size, size[:2] * 0, 60)

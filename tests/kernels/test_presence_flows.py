@@ -32,11 +32,3 @@ def test_nothing_is_moved_onto_itself(places):
 def test_mass_that_has_no_place_to_go_stays():
     start, end = np.array([[3.0, 0]]), np.array([[0, 1.0]])
     assert [2.0] == earth_mover(start, end, 2 - 2 * np.eye(2)).tolist()
-
-
-@pytest.mark.parametrize("number", range(3))
-def test_numbers_that_are_none_are_refused(number):
-    arguments = [np.full((2, 3), 1 / 3), np.full((2, 3), 1 / 3), np.zeros((3, 3))]
-    arguments[number][0, 0] = np.nan
-    with pytest.raises(ValueError, match="finite"):
-        earth_mover(*arguments)

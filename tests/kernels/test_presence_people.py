@@ -1,7 +1,6 @@
 """The stays of people who are followed side by side, against products of matrices one by one."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.kernels.test_presence_stays import PATCHES, SIZES, by_place, case, no_moments
@@ -90,10 +89,3 @@ def test_learned_stays_are_those_of_whole_arrays(seed, people, stages, rooms):
     for part, expected in zip(learned_stays(*asked), slow.learned_stays(*asked), strict=True):
         assert part.shape == expected.shape
         assert np.abs(part - expected).max(initial=0) < 1e-12
-
-
-@pytest.mark.parametrize("first", [[0, 2], [0, 1, 3], [1, 2, 4], [0, 3, 2, 4]])
-def test_learned_stays_refuse_other_places(first):
-    counts = Moments(*(np.zeros(shape) for shape in ((1, 2), (1, 2, 3), (1, 4), (1, 2), (1, 2))))
-    with pytest.raises(ValueError, match="first must ascend from 0"):
-        learned_stays(counts, np.ones(1), np.ones(4), np.ones(2), np.array(first), 0.05)

@@ -1,7 +1,6 @@
 """What a robot remembers of people in rooms: the core against plain Python."""
 
 import numpy as np
-import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from tests.reference import room_memory as slow
@@ -58,9 +57,3 @@ def test_observation_of_a_memory_equals_the_slow_twin(seen, visited):
     show_memory(memory, columns, np.array(visited), 300_000, 9, 1.0, [0.25, -3], table)
 
     assert expected.tobytes() == table.tobytes()
-
-
-@pytest.mark.parametrize(("identity", "room"), [(PEOPLE, 0), (-2, 0), (0, ROOMS)])
-def test_sighting_of_nobody_or_nowhere_is_refused(identity, room):
-    with pytest.raises(ValueError, match="there is no such"):
-        remembered([(0, identity, room)])

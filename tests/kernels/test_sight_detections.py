@@ -1,8 +1,7 @@
 """What a camera sees, against a twin that looks at every wall and at sixty digits of a cosine."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -22,12 +21,9 @@ from fleet2d.kernels import (
     I64,
     MAX_GHOSTS,
     U64,
-    USER_LOST,
-    USER_SEEN,
     About,
     DetectionRule,
     Heights,
-    SightMemory,
     UserDraw,
     Window,
     detect,
@@ -38,13 +34,15 @@ from fleet2d.sight.perception import Perception
 
 ANGLES = [1, 90, 180, 181, 359, 360]
 EIGHTHS = [0, 512, 1024, 1536, 2048, 2560, 3072, 3584]
-STEPS = 12
+STEPS = 24
 RADIUS = 100  # of users, lattice units
 STEP_US = 1_000_000
 START_US = 86_340_000_000
 """A minute before midnight."""
 FIRST = 40
 """A step 20 s before it."""
+SURE = 2**53
+ROOM = home_of([shapely.box(0, 0, 1280, 1280)])
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ class Scene:
     keys: U64
     strangers: int = 0
     is_first: bool = True
-    perceptions: Sequence[Perception | None] = ()
+    perceptions: Any = ()
     shown: U64 | None = None
     thickness: int = 0
     heights: int = 0
@@ -78,81 +76,72 @@ class Scene:
     def part(self, begin, end):
         """Return some steps of it."""
         shown = None if self.shown is None else self.shown[..., begin:end]
-        return replace(
-            self, robot=self.robot[begin:end], users=self.users[:, begin:end], shown=shown
-        )
+        robot, users = self.robot[begin:end], self.users[:, begin:end]
+        return replace(self, robot=robot, users=users, shown=shown)
 
     def window(self, first):
         """Return how all bodies move, the number of the robot, and that of the first user."""
-        robot = self.robot[None][..., [0, 1, 3, 2]]
-        robot = np.concatenate([robot, np.zeros_like(robot[..., :1])], axis=2)
+        robot = np.insert(self.robot[None][..., [0, 1, 3, 2]], 4, 0, axis=2)
         stranger = np.repeat(robot, self.strangers, axis=0)  # at the robot: in view if anybody is
         stranger[..., 2] = 0
         parts = [robot, stranger, self.users] if self.is_first else [self.users, stranger, robot]
-        bodies = np.concatenate([stranger, *parts, stranger])
-        x, y, away, heading, posture = bodies.transpose(2, 0, 1)
+        x, y, away, heading, posture = np.concatenate([stranger, *parts, stranger]).transpose(
+            2, 0, 1
+        )
         window = Window(first, x, y, heading, away.astype(np.uint8), posture.astype(np.int8))
         one, other = self.strangers, len(self.users)
-        if self.is_first:
-            return window, one, 2 * one + 1
-        return window, 2 * one + other, one
+        return (window, one, 2 * one + 1) if self.is_first else (window, 2 * one + other, one)
 
+    @property
     def radii(self):
-        """Return the radii of all bodies of the window, None if they don't hide each other."""
+        """The radii of all bodies of the window, None if they don't hide each other."""
         count = len(self.users) + 1 + 3 * self.strangers
         return self.thickness + 7 * np.arange(count) if self.thickness else None
 
-    def obstacles(self):
-        """Return the obstacles that hide users, for the reference."""
-        radii = self.radii()
-        if radii is None:
-            return None
-        _, robot, first_user = self.window(0)
-        here = [slow.Body(x, y, False) for x, y, *_ in self.robot.tolist()]
-        result = {}
-        for number, radius in enumerate(radii.tolist()):
-            user = number - first_user
-            if 0 <= user < len(self.users):
-                poses = [
-                    slow.Body(x, y, bool(away), heading, posture)
-                    for x, y, away, heading, posture in self.users[user].tolist()
-                ]
-                result[user] = slow.Obstacle(poses, radius)
-            elif number != robot:
-                result[-1 - number] = slow.Obstacle(here, radius)
-        return result
-
-    def heights_for(self, eyes):
+    def heights_for(self, cameras):
         """Return the heights of cameras, bodies and furniture, for the kernel and for the twin."""
         if not self.heights:
-            return None
+            return None, None
         rng, users = np.random.default_rng(self.heights), len(self.users)
-        count, points = users + 1 + 3 * self.strangers, max(eye.points for eye in eyes) + 1
+        count, points = users + 1 + 3 * self.strangers, max(eye.points for eye in cameras) + 1
         low = np.array([0, 300, 500, 800, 1700])  # several are equal, so that lines graze
-        levels = Heights(
-            eyes=rng.choice(low, (len(eyes), 3)),
-            points=rng.choice(low, (len(eyes), users, 3, points)),
-            tops=rng.choice(low, (count, 3)),
-            corners=np.zeros((0, 2), np.int64),
-            start=np.zeros(1, np.int64),
-            boxes=np.zeros((0, 4), np.int64),
-            top=np.zeros(0, np.int64),
-        )
         pieces = [_piece(rng) for _ in range(rng.integers(0, 6))]
-        if pieces:
-            corners = [np.array(piece.corners) for piece in pieces]
-            levels = levels._replace(
-                corners=np.concatenate(corners),
-                start=np.cumsum([0, *map(len, corners)]),
-                boxes=np.array([[*c.min(axis=0), *c.max(axis=0)] for c in corners]),
-                top=np.array([piece.top for piece in pieces]),
-            )
-        *_, first_user = self.window(0)
-        tops = {
-            n - first_user if 0 <= n - first_user < users else -1 - n: levels.tops[n].tolist()
-            for n in range(count)
-        }
-        return levels, slow.Heights(levels.eyes.tolist(), levels.points.tolist(), tops, pieces)
+        corners = [corner for piece in pieces for corner in piece.corners]
+        boxes = [[*np.min(p.corners, axis=0), *np.max(p.corners, axis=0)] for p in pieces]
+        levels = Heights(
+            eyes=rng.choice(low, (len(cameras), 3)),
+            points=rng.choice(low, (len(cameras), users, 3, points)),
+            tops=rng.choice(low, (count, 3)),
+            corners=np.array(corners, np.int64).reshape(-1, 2),
+            start=np.cumsum([0, *(len(piece.corners) for piece in pieces)]),
+            boxes=np.array(boxes, np.int64).reshape(-1, 4),
+            top=np.array([piece.top for piece in pieces], np.int64),
+        )
+        return levels, slow.Heights(levels.eyes.tolist(), levels.points.tolist(), pieces)
+
+    def watched(self, walls, cameras):
+        """Return what the twin looks at."""
+        levels, heights = self.heights_for(cameras)
+        robot = [
+            slow.Body(x, y, bool(away), heading) for x, y, heading, away in self.robot.tolist()
+        ]
+        users = [
+            [slow.Body(x, y, bool(away), heading, posture) for x, y, away, heading, posture in user]
+            for user in self.users.tolist()
+        ]
+        here = [slow.Body(x, y, False) for x, y, *_ in robot]
+        _, robots_number, first_user = self.window(0)
+        obstacles = {}
+        for number, radius in enumerate([] if self.radii is None else self.radii.tolist()):
+            tops = None if levels is None else levels.tops[number].tolist()
+            user = number - first_user
+            if 0 <= user < len(users):
+                obstacles[user] = slow.Obstacle(users[user], radius, tops)
+            elif number != robots_number:
+                obstacles[-1 - number] = slow.Obstacle(here, radius, tops)
+        method = None if self.shown is None else lambda c, u, j: int(self.shown[c, u, j])
+        keys = self.keys.tolist()
+        return slow.Watched(walls, robot, users, RADIUS, keys, STEP_US, method, obstacles, heights)
 
 
 def _piece(rng):
@@ -166,15 +155,6 @@ def _piece(rng):
     return slow.Piece(shapes[rng.integers(0, 3)], int(rng.choice([300, 500, 800])))
 
 
-@dataclass
-class Carried:
-    """What a robot carries from span to span: in the kernel, and in the twin."""
-
-    memory: SightMemory
-    known: list[slow.Known]
-    errors: list[slow.Errors | None] = field(default_factory=list)
-
-
 class Seen(NamedTuple):
     """What came of a look: steps done, sightings, events, counts, and the memory afterwards."""
 
@@ -185,144 +165,79 @@ class Seen(NamedTuple):
     noticed: list[int]
     seen: list[int]
 
-    @property
-    def places(self):
-        """Sightings by step, camera, user, x and y."""
-        return [(step, camera, user, x, y) for step, camera, user, _, x, y, *_ in self.sightings]
-
 
 def half_angle(degrees):
     """Return the half of a field of view as a lens has it."""
     return round(degrees / 360 * 4096)
 
 
-def lattice():
-    """Return a lattice whose units are those of the homes here."""
-    return Lattice(cell=0.05, origin=(0.0, 0.0), columns=20, rows=20)
-
-
-def listed(eye):
-    """Return one camera, or several, as a list."""
-    return [eye] if isinstance(eye, slow.Eye) else list(eye)
-
-
-def tables_of(eyes, scene):
-    """Return how cameras err, with a stream for each draw."""
-    perceptions = list(scene.perceptions) or [None] * len(eyes)
-    count = len(scene.users)
-    context = TableContext(
-        [f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r"
-    )
-    errors = error_tables([Lens(**eye._asdict()) for eye in eyes], perceptions, context)
-    for c in range(len(eyes)):
+def tables_of(cameras, scene):
+    """Return lenses as the kernel has them, and how they err, with a stream for each draw."""
+    perceptions = list(scene.perceptions) or [None] * len(cameras)
+    lenses, count = [Lens(**eye._asdict()) for eye in cameras], len(scene.users)
+    lattice = Lattice(cell=0.05, origin=(0.0, 0.0), columns=20, rows=20)
+    names = [f"u{i}" for i in range(count)]
+    context = TableContext(names, [RADIUS] * count, lattice, STEP_US, "r")
+    errors = error_tables(lenses, perceptions, context)
+    for c in range(len(cameras)):
         for draw in UserDraw:
             errors.keys[c, :, draw] = scene.keys + np.uint64(c + 100 * (draw - UserDraw.DETECT))
         errors.ghost_keys[c] = scene.keys.sum() + np.arange(5, dtype=np.uint64) * np.uint64(7 + c)
-    return errors
+    errs = [perception is not None for perception in perceptions]
+    return stack_lenses(lenses, errs, context), errors
 
 
-def kernel_args(eyes, scene):
-    """Return cameras as the kernel wants them."""
-    lenses = [Lens(**eye._asdict()) for eye in eyes]
+def nothing_known(cameras, scene):
+    """Return what a robot carries that has seen nobody, for the kernel and for the twin."""
     count = len(scene.users)
-    about = TableContext([f"u{i}" for i in range(count)], [RADIUS] * count, lattice(), STEP_US, "r")
-    errs = [p is not None for p in scene.perceptions] or [False] * len(eyes)
-    patience = max(eye.patience for eye in eyes)
-    errors = tables_of(eyes, scene)
-    burst = int((count + MAX_GHOSTS * errors.has_ghosts).sum())
-    rule = DetectionRule(patience, STEP_US, START_US, burst, False, False)
-    return stack_lenses(lenses, errs, about), errors, rule
-
-
-def nothing_known(eye, scene):
-    """Return what a robot carries that has seen nobody."""
-    eyes, count, errors = listed(eye), len(scene.users), tables_of(listed(eye), scene)
+    _, errors = tables_of(cameras, scene)
     bursts = count + MAX_GHOSTS * errors.has_ghosts
-    rows = max(
-        int((eye.latency // eye.period + 2) * burst)
-        for eye, burst in zip(eyes, bursts, strict=True)
-    )
-    known = [slow.Known(-1, False) for _ in range(count + 1)]
+    looks = np.array([eye.latency // eye.period + 2 for eye in cameras])
     errs = [
         None if perception is None else slow.Errors(errors, c, START_US)
-        for c, perception in enumerate(scene.perceptions)
+        for c, perception in enumerate(scene.perceptions or [None] * len(cameras))
     ]
-    return Carried(new_memory(len(eyes), count, rows), known, errs)
+    carried = slow.Carried([-1] * (count + 1), [False] * (count + 1), errs)
+    return new_memory(len(cameras), count, int((looks * bursts).max())), carried
 
 
-def looked(
-    home,
-    eye,
-    scene,
-    first,
-    stops=(False, False),
-    carried=None,
-):
+def looked(home, cameras, scene, first, stops=(False, False), memory=None):
     """Return what the kernel sees."""
-    eyes = listed(eye)
-    memory = (carried or nothing_known(eyes, scene)).memory
-    lenses, errors, rule = kernel_args(eyes, scene)
-    rule = rule._replace(stop_lost=stops[0], stop_seen=stops[1])
+    memory = memory or nothing_known(cameras, scene)[0]
+    lenses, errors = tables_of(cameras, scene)
+    burst = int((len(scene.users) + MAX_GHOSTS * errors.has_ghosts).sum())
+    patience = max(eye.patience for eye in cameras)
+    rule = DetectionRule(patience, STEP_US, START_US, burst, *stops)
     before = memory.about.copy()
-    heights = scene.heights_for(eyes)
+    heights, _ = scene.heights_for(cameras)
     done, step, index, distinct, newest, events = detect(
-        home.mesh,
-        lenses,
-        errors,
-        rule,
-        *scene.window(first),
-        memory,
-        scene.shown,
-        scene.radii(),
-        heights and heights[0],
-    )
+        home.mesh, lenses, errors, rule, *scene.window(first), memory, scene.shown, scene.radii, heights
+    )  # fmt: skip
     rows = SightingTable(step, index, distinct.T).rows()
     assert newest_of(rows, len(newest)) == [
         int(np.flatnonzero(index == number)[-1]) if number >= 0 else -1 for number in newest
     ]
-    counts = (memory.about - before)[..., [About.IN_VIEW, About.NOTICED]]
-    return Seen(
-        done,
-        [tuple(row) for row in rows.tolist()],
-        events,
-        counts.tolist(),
-        memory.noticed.tolist(),
-        memory.seen.tolist(),
-    )
+    sightings = [tuple(row) for row in rows.tolist()]
+    counts = (memory.about - before)[..., [About.IN_VIEW, About.NOTICED]].tolist()
+    return Seen(done, sightings, events, counts, memory.noticed.tolist(), memory.seen.tolist())
 
 
-def looked_slowly(
-    home,
-    eye,
-    scene,
-    first,
-    stops=(False, False),
-    carried=None,
-):
-    """Return what the twin sees."""
-    eyes, carried = listed(eye), carried or nothing_known(eye, scene)
-    shown, heights = scene.shown, scene.heights_for(eyes)
-    result = slow.detect(
-        home.walls,
-        eyes,
-        [slow.Body(x, y, bool(away), heading) for x, y, heading, away in scene.robot.tolist()],
-        [
-            [slow.Body(x, y, bool(away), heading, posture) for x, y, away, heading, posture in user]
-            for user in scene.users.tolist()
-        ],
-        [RADIUS] * len(scene.users),
-        [[(key + c) % 2**64 for key in scene.keys.tolist()] for c in range(len(eyes))],
-        STEP_US,
-        first,
-        carried.known,
-        stops,
-        carried.errors,
-        None if shown is None else lambda c, u, j: int(shown[c, u, j]),
-        scene.obstacles(),
-        heights and heights[1],
-    )
-    known = carried.known
-    return Seen(*result, [k.noticed for k in known], [int(k.seen) for k in known])
+def assert_same(home, cameras, scene, first, stops=(False, False), cuts=()):
+    """Compare what the kernel and its twin see, look by look; return all sightings.
+
+    A look ends at a cut, and where the look before stopped the next one goes on.
+    """
+    (memory, carried), at, sightings = nothing_known(cameras, scene), 0, []
+    while at < len(scene.robot):
+        end = min((cut for cut in cuts if cut > at), default=len(scene.robot))
+        part = scene.part(at, end)
+        watched = part.watched(home.walls, cameras)
+        result = slow.detect(watched, cameras, first + at, carried, stops)
+        expected = Seen(*result, carried.noticed, [int(seen) for seen in carried.seen])
+        assert expected == looked(home, cameras, part, first + at, stops, memory)
+        at += expected.done
+        sightings += expected.sightings
+    return sightings
 
 
 def rested(rng, poses, moves):
@@ -331,7 +246,7 @@ def rested(rng, poses, moves):
     return poses[np.maximum.accumulate(np.where(rng.random(len(poses)) < moves, steps, 0))]
 
 
-def scene_in(home, rng, count, steps=STEPS, moves=1.0):
+def scene_in(home, rng, count, steps, moves):
     """Return a scene where much goes on: bodies at one point, on borders, on walls, away.
 
     Bodies take another pose with the probability `moves`, each for itself.
@@ -392,8 +307,6 @@ def odd_eyes(draw):
     )
 
 
-stoppings = st.tuples(st.booleans(), st.booleans())
-
 CURVES = {
     "distance": [[0, 1], [0.3, 0.4]], "bearing": [[-90, 0.5], [90, 1]],
     "orientation": [[0, 1], [180, 0.6]], "posture": {"sit": 0.8, "lie": 0.3},
@@ -441,291 +354,95 @@ def errors_of(draw, cameras, users):
     return [draw(st.one_of(st.none(), perceptions(eye.period, users))) for eye in cameras]
 
 
-def assert_same(
-    home,
-    eye,
-    scene,
-    first,
-    stops=(False, False),
-):
-    """Compare what the kernel and its twin see, and return it."""
-    expected = looked_slowly(home, eye, scene, first, stops)
-    assert expected == looked(home, eye, scene, first, stops)
-    return expected
-
-
-@quick
-@given(homes(), eyes(), seeds(), st.integers(0, 3), st.integers(0, 10**9), stoppings)
-def test_look_equals_the_reference(polygons, eye, seed, count, first, stops):
-    home = home_of(polygons)
-    scene = scene_in(home, np.random.default_rng(seed), count)
-
-    assert_same(home, eye, scene, first, stops)
-
-
-@quick
-@given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), st.integers(0, 3), stoppings)
-def test_look_of_several_cameras_equals_the_reference(polygons, cameras, seed, count, stops):
-    home = home_of(polygons)
-    scene = scene_in(home, np.random.default_rng(seed), count)
-    assert_same(home, cameras, scene, 7, stops)
-
-
-MOVES = st.sampled_from([0.05, 0.2, 0.5])
-LONG = 3 * STEPS
-THICKNESSES = st.sampled_from([0, 1, 30, 100])
-
-
-@quick
-@given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings)
-def test_look_at_bodies_that_mostly_rest_equals_the_reference(
-    polygons, cameras, seed, moves, stops
-):
-    """Where neither moves, one verdict holds for many steps: until a camera pans."""
-    home = home_of(polygons)
-    scene = scene_in(home, np.random.default_rng(seed), 2, LONG, moves)
-
-    assert_same(home, cameras, scene, FIRST, stops)
-
-
+@pytest.mark.parametrize(
+    "features",
+    [[], ["thick"], ["thick", "high"], ["errs"], ["errs", "thick", "shown"]],
+    ids=lambda features: " ".join(features) or "plain",
+)
 @quick
 @given(
+    st.data(),
     homes(),
     st.lists(odd_eyes(), min_size=1, max_size=3),
     seeds(),
-    st.sampled_from([0.05, 0.2, 1.0]),
-    stoppings,
-    st.sampled_from([1, 30, 100]),
+    st.integers(0, 3),
+    st.tuples(st.booleans(), st.booleans()),
 )
-def test_look_past_bodies_that_hide_each_other_equals_the_reference(
-    polygons, cameras, seed, moves, stops, thickness
-):
-    home = home_of(polygons)
-    scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
-    scene = replace(scene, thickness=thickness)
+def test_looks_equal_the_reference(features, data, polygons, cameras, seed, count, stops):
+    """Where neither body moves, one verdict holds for many steps: until a camera pans."""
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    moves = data.draw(st.sampled_from([0.05, 0.2, 0.5, 1.0]))
+    scene = scene_in(home, rng, count, STEPS, moves)
+    if "thick" in features:
+        scene = replace(scene, thickness=data.draw(st.sampled_from([0, 1, 30, 100])))
+    if "high" in features:
+        scene = replace(scene, heights=seed + 1)
+    if "errs" in features:
+        scene = replace(scene, perceptions=data.draw(errors_of(cameras, count)))
+    if "shown" in features:
+        shown = np.zeros((len(cameras), count, STEPS), np.uint64)
+        for c, u in np.ndindex(shown.shape[:2]):
+            points = rng.integers(0, 2 ** (cameras[c].points + 1), STEPS, np.uint64)
+            shown[c, u] = rested(rng, np.where(rng.random(STEPS) < 0.7, points, 0), moves)
+        scene = replace(scene, shown=shown)
+    cuts = data.draw(st.lists(st.integers(1, STEPS - 1), max_size=2))
+    first = data.draw(st.sampled_from([FIRST, 7, 10**9]))
 
-    assert_same(home, cameras, scene, FIRST, stops)
-
-
-@pytest.mark.parametrize("moves", [0.1, 1.0])
-def test_look_past_bodies_in_one_room_equals_the_reference(moves):
-    """Where bodies hide each other often, and parts of each other."""
-    eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
-    scene = scene_in(ROOM, np.random.default_rng(8), 6, 120, moves)
-    scene = replace(scene, thickness=60)
-    expected = assert_same(ROOM, eyes_, scene, FIRST)
-    assert (
-        100 < len(expected.sightings) < len(looked(ROOM, eyes_, replace(scene, thickness=0), 0)[1])
-    )
-
-
-@quick
-@given(homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, THICKNESSES)
-def test_look_over_furniture_and_bodies_equals_the_reference(
-    polygons, cameras, seed, moves, thickness
-):
-    home = home_of(polygons)
-    scene = scene_in(home, np.random.default_rng(seed), 3, LONG, moves)
-    scene = replace(scene, thickness=thickness, heights=seed + 1)
-
-    assert_same(home, cameras, scene, FIRST)
+    assert_same(home, cameras, scene, first, stops, cuts)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("thickness", [0, 60])
-def test_look_over_furniture_in_one_room_equals_the_reference(thickness):
-    """Where furniture hides people often, and parts of them."""
-    eyes_ = [slow.Eye(0, 900, 4096, SURE, 2, points=7), slow.Eye(0, 900, 300, SURE, 2, forward=40)]
-    scene = scene_in(ROOM, np.random.default_rng(8), 5, 60, 0.3)
-    scene = replace(scene, thickness=thickness, heights=7)
-    expected = assert_same(ROOM, eyes_, scene, FIRST)
-    flat = looked(ROOM, eyes_, replace(scene, heights=0), FIRST)
-    assert 100 < len(expected.sightings)
-    assert expected.places != flat.places
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"eyes": np.full((1, 3), 2**13)}, "heights must be in 0"),
-        ({"eyes": np.zeros((2, 3), np.int64)}, "eyes must be"),
-        ({"tops": np.zeros((1, 3), np.int64)}, "tops"),
-        ({"points": np.zeros((1, 1, 3, 1), np.int64)}, "points must be"),
-        ({"start": np.array([0, 1])}, "start must have one more"),
-        ({"corners": np.zeros((3, 2), np.int64)}, "start must cover"),
-        ({"start": np.zeros(2, np.int64), "top": np.ones(1, np.int64),
-          "boxes": np.zeros((1, 4), np.int64)}, "each piece must have corners"),
-    ],
-)  # fmt: skip
-def test_heights_that_do_not_fit_are_refused(change, message):
-    eye = slow.Eye(0, 900, 4096, SURE, 2, points=2)
-    scene = replace(scene_in(ROOM, np.random.default_rng(3), 2, 5), heights=1, strangers=0)
-    given_heights = scene.heights_for([eye])
-    assert given_heights is not None
-    empty = {"corners": np.zeros((0, 2), np.int64), "start": np.zeros(1, np.int64),
-             "boxes": np.zeros((0, 4), np.int64), "top": np.zeros(0, np.int64)}  # fmt: skip
-    heights = given_heights[0]._replace(**empty)._replace(**change)
-    lenses, errors, rule = kernel_args([eye], scene)
-    memory = nothing_known(eye, scene).memory
-
-    with pytest.raises(ValueError, match=message):
-        detect(ROOM.mesh, lenses, errors, rule, *scene.window(0), memory, heights=heights)
-
-
-@quick
-@given(st.data(), st.lists(odd_eyes(), min_size=1, max_size=2), seeds(), MOVES, stoppings)
-def test_look_of_cameras_that_err_equals_the_reference(data, cameras, seed, moves, stops):
-    rng = np.random.default_rng(seed)
-    home, count = home_of(data.draw(homes())), int(rng.integers(0, 4))
-    errs = data.draw(errors_of(cameras, count))
-    scene = replace(scene_in(home, rng, count, LONG, moves), perceptions=errs)
-
-    assert_same(home, cameras, scene, FIRST, stops)
-
-
-@quick
-@given(
-    st.data(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), MOVES, stoppings, THICKNESSES
-)
-def test_look_by_another_method_equals_the_reference(data, cameras, seed, moves, stops, thickness):
-    rng = np.random.default_rng(seed)
-    home, errs = home_of(data.draw(homes())), data.draw(errors_of(cameras, 2))
-    scene = scene_in(home, rng, 2, LONG, moves)
-    shown = np.zeros((len(cameras), 2, LONG), np.uint64)
-    for c, eye in enumerate(cameras):
-        points = rng.integers(0, 2 ** (eye.points + 1), (2, LONG), np.uint64)
-        for u in range(2):
-            shown[c, u] = rested(rng, np.where(rng.random(LONG) < 0.7, points[u], 0), moves)
-    scene = replace(scene, shown=shown, perceptions=errs, thickness=thickness)
-
-    assert_same(home, cameras, scene, FIRST, stops)
-
-
-@quick
-@given(st.data(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds(), st.integers(1, LONG - 1))
-def test_look_of_several_cameras_at_two_spans_is_that_at_one(data, cameras, seed, cut):
-    home, rng = home_of(data.draw(homes())), np.random.default_rng(seed)
-    scene = scene_in(home, rng, 3, LONG, data.draw(st.sampled_from([1.0, 0.2])))
-    errs, thickness = data.draw(errors_of(cameras, 3)), data.draw(THICKNESSES)
-    scene = replace(scene, perceptions=errs, thickness=thickness)
-    whole = looked(home, cameras, scene, 50)
-
-    carried = nothing_known(cameras, scene)
-    first = looked(home, cameras, scene.part(0, cut), 50, carried=carried)
-    second = looked(home, cameras, scene.part(cut, LONG), 50 + cut, carried=carried)
-
-    assert whole.sightings == first.sightings + second.sightings
-    assert whole.events == first.events + second.events
-    assert (whole.noticed, whole.seen) == (second.noticed, second.seen)
-
-
-def test_look_returns_any_number_of_sightings():
-    scene = line_of([(50 + i, 0) for i in range(20)], steps=5000)
-
-    seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 0)
-
-    assert 5000 == seen.done
-    assert [(step, 0, u) for step in range(5000) for u in range(20)] == [
-        row[:3] for row in seen.sightings
+@pytest.mark.parametrize("heights", [0, 7])
+def test_looks_past_bodies_and_furniture_in_one_room_equal_the_reference(heights):
+    """Where they hide people often, and parts of them."""
+    cameras = [
+        slow.Eye(0, 900, 4096, SURE, 2, points=7),
+        slow.Eye(0, 900, 300, SURE, 2, forward=40),
     ]
+    scene = scene_in(ROOM, np.random.default_rng(8), 5, 60, 0.3)
+    hidden = replace(scene, thickness=60, heights=heights)
+
+    sightings = assert_same(ROOM, cameras, hidden, FIRST)
+    assert 100 < len(sightings) < len(looked(ROOM, cameras, scene, FIRST).sightings)
 
 
-@pytest.mark.parametrize("degrees", ANGLES)
-@pytest.mark.parametrize("detection", [0.0, 0.5, 1.0])
-def test_look_in_one_room_equals_the_reference(degrees, detection):
-    home = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
-    eye = slow.Eye(0, 700, half_angle(degrees), round(detection * 2**53), 2)
-    scene = scene_in(home, np.random.default_rng(degrees), 4, 150)
-
-    expected = assert_same(home, eye, scene, 1000)
-    assert (detection > 0) == bool(expected.sightings)
-
-
-@pytest.mark.parametrize("per_track", [True, False])
-@pytest.mark.parametrize(("memory", "patience"), [("0 s", 2), ("4 s", 5)])
-def test_look_in_one_room_of_cameras_that_err_equals_the_reference(per_track, memory, patience):
+@pytest.mark.parametrize(("per_track", "memory", "patience"), [(True, "0 s", 2), (False, "4 s", 5)])
+def test_looks_in_one_room_of_cameras_that_err_equal_the_reference(per_track, memory, patience):
     """Where users are in view most of the time, so that every way to err happens often."""
-    home = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
     cameras = [
         slow.Eye(0, 900, half_angle(200), SURE, patience, pans=(0, 1024, 3072), pan_us=2_500_000),
         slow.Eye(0, 700, 4096, SURE, patience, forward=40, period=2, latency=3, points=6),
     ]
     identity = {"right": [[0, 0.6], [0.5, 0.4]], "mistaken": 0.3, "per_track": per_track}
     spot = {"at": [0.2, 0.3], "per_hour": 700, "spread": 0.03}
-    false = {"per_hour": 1000, "spots": [spot], "looks_like": {"u0": 0.5}}
     errs = Perception.model_validate(
         {
             "detection": {**CURVES, "memory": memory},
             "identity": identity,
             "attributes": NOISE,
-            "false_positives": false,
+            "false_positives": {"per_hour": 1000, "spots": [spot], "looks_like": {"u0": 0.5}},
         }
     )
-    scene = scene_in(home, np.random.default_rng(per_track), 3, 150, 0.1)
+    scene = scene_in(ROOM, np.random.default_rng(per_track), 3, 150, 0.1)
     scene = replace(scene, perceptions=[errs, errs])
 
-    expected = assert_same(home, cameras, scene, FIRST)
-    users = [row[2:4] for row in expected.sightings]
+    users = [row[2:4] for row in assert_same(ROOM, cameras, scene, FIRST)]
     assert min(users.count((u, u)) for u in range(3)) > 5
     assert len([1 for u, who in users if u >= 0 > who]) > 5
     assert len([1 for u, who in users if u >= 0 and who not in (u, -1)]) > 5
     assert min(users.count((-1, who)) for who in (-1, 0)) > 5
 
 
-@quick
-@given(homes(), eyes(), seeds(), st.integers(1, STEPS - 1))
-def test_look_at_two_spans_is_that_at_one(polygons, eye, seed, cut):
-    home = home_of(polygons)
-    scene = scene_in(home, np.random.default_rng(seed), 3)
-    whole = looked(home, eye, scene, 50)
-
-    carried = nothing_known(eye, scene)
-    first = looked(home, eye, scene.part(0, cut), 50, carried=carried)
-    second = looked(home, eye, scene.part(cut, STEPS), 50 + cut, carried=carried)
-
-    assert whole == Seen(
-        first.done + second.done,
-        first.sightings + second.sightings,
-        first.events + second.events,
-        (np.array(first.counts) + np.array(second.counts)).tolist(),
-        second.noticed,
-        second.seen,
-    )
-
-
-@quick
-@given(homes(), eyes(), seeds(), stoppings)
-def test_looks_with_stops_equal_looks_without(polygons, eye, seed, stops):
-    home = home_of(polygons)
-    scene = scene_in(home, np.random.default_rng(seed), 3)
-    whole = looked(home, eye, scene, 0)
-
-    carried, at, sightings, events = nothing_known(eye, scene), 0, [], []
-    while at < STEPS:
-        seen = looked(home, eye, scene.part(at, STEPS), at, stops, carried)
-        stopping = [step for step, _, kind in seen.events if stops[kind]]
-        at += seen.done
-        assert [at - 1] * len(stopping) == stopping
-        assert stopping or at == STEPS
-        sightings += seen.sightings
-        events += seen.events
-
-    assert (whole.sightings, whole.events) == (sightings, events)
-    memory = carried.memory
-    assert (whole.noticed, whole.seen) == (memory.noticed.tolist(), memory.seen.tolist())
-
-
-def test_look_at_another_user_leaves_the_draws_of_the_first_alone():
+def test_a_look_at_another_user_leaves_the_draws_of_the_first_alone():
     """Known failure 9: adding a user changed the robot's random numbers."""
-    home = home_of([shapely.box(0, 0, 1280, 960)])
-    eye = slow.Eye(0, 700, half_angle(180), 2**52, 2)
-    both = scene_in(home, np.random.default_rng(4), 2, 60)
+    cameras = [slow.Eye(0, 700, half_angle(180), 2**52, 2)]
+    both = scene_in(ROOM, np.random.default_rng(4), 2, 60, 1.0)
     second = replace(both, users=both.users[1:], keys=both.keys[1:])
 
-    of_both = [(s, x, y) for s, _, user, x, y in looked(home, eye, both, 0).places if user == 1]
+    of_both = [row for row in looked(ROOM, cameras, both, 0).sightings if row[2] == 1]
+    alone = looked(ROOM, cameras, second, 0).sightings
 
-    assert len(of_both) > 3
-    assert of_both == [(s, x, y) for s, _, _, x, y in looked(home, eye, second, 0).places]
+    assert len(alone) > 3
+    assert [(row[0], *row[4:]) for row in of_both] == [(row[0], *row[4:]) for row in alone]
 
 
 def line_of(users, steps=1, heading=0):
@@ -735,8 +452,18 @@ def line_of(users, steps=1, heading=0):
     return Scene(robot, np.array(still, np.int64), np.arange(len(users), dtype=np.uint64))
 
 
-ROOM = home_of([shapely.box(0, 0, 1280, 1280)])
-SURE = 2**53
+def sees(eye, scene, home=ROOM):
+    """Return whether the first look sees somebody."""
+    return bool(looked(home, [eye], scene, 0).sightings)
+
+
+def test_a_look_returns_any_number_of_sightings():
+    scene = line_of([(50 + i, 0) for i in range(20)], steps=5000)
+
+    sightings = looked(ROOM, [slow.Eye(0, 100, 300, SURE, 4)], scene, 0).sightings
+
+    expected = [(step, 0, u) for step in range(5000) for u in range(20)]
+    assert expected == [row[:3] for row in sightings]
 
 
 @pytest.mark.parametrize(
@@ -750,50 +477,28 @@ SURE = 2**53
         (50, 100, 101, False),
     ],
 )
-def test_look_sees_between_its_ranges_ends_included(near, far, distance, expected):
-    seen = looked(ROOM, slow.Eye(near, far, 300, SURE, 1), line_of([(distance, 0)]), 0)
-
-    assert expected == bool(seen.sightings)
+def test_a_look_sees_between_its_ranges_ends_included(near, far, distance, expected):
+    assert expected == sees(slow.Eye(near, far, 300, SURE, 1), line_of([(distance, 0)]))
 
 
 @pytest.mark.parametrize(
     ("degrees", "heading", "offset", "expected"),
     [
-        (90, 0, (60, 60), True),
-        (90, 0, (60, 61), False),
         (90, 0, (60, -60), True),
-        (90, 0, (60, -61), False),
-        (90, 1024, (60, 60), True),
-        (90, 1024, (61, 60), False),
-        (90, 2560, (-60, 0), True),
+        (90, 0, (60, 61), False),
         (90, 2560, (0, -60), True),
-        (90, 2560, (1, -60), False),
         (180, 0, (0, 60), True),
-        (180, 0, (0, -60), True),
-        (180, 0, (-1, 60), False),
-        (180, 512, (60, -60), True),
         (180, 512, (60, -61), False),
         (181, 0, (-1, 200), True),
-        (181, 0, (-2, 200), False),
-        (181, 0, (-1, -200), True),
-        (270, 0, (-60, 60), True),
-        (270, 0, (-61, 60), False),
-        (270, 0, (-60, -60), True),
         (359, 0, (-60, 0), False),
-        (359, 0, (-60, 1), True),
-        (359, 0, (-300, 1), False),
         (360, 0, (-60, 0), True),
-        (1, 0, (300, 2), True),
-        (1, 0, (300, 3), False),
-        (1, 0, (-300, 0), False),
         (1, 0, (0, 0), True),
     ],
 )
-def test_look_sees_within_its_angle_borders_included(degrees, heading, offset, expected):
+def test_a_look_sees_within_its_angle_borders_included(degrees, heading, offset, expected):
     eye = slow.Eye(0, 600, half_angle(degrees), SURE, 1)
-    scene = line_of([offset], heading=heading)
 
-    assert expected == bool(looked(ROOM, eye, scene, 0).sightings)
+    assert expected == sees(eye, line_of([offset], heading=heading))
     assert expected == slow.in_wedge(heading, eye.half_angle, *offset)
 
 
@@ -803,16 +508,12 @@ def test_in_wedge_of_every_direction_equals_cosines(half):
     for heading in [0, 512, 2048, 4095, *rng.integers(0, 4096, 12).tolist()]:
         ahead, right, left = 2 * heading, 2 * heading - half, 2 * heading + half
         for part in (ahead, right - 3, right + 3, left - 3, left + 3, ahead + 4096):
-            dx, dy = (round(5760 * float(f(part))) for f in (slow.cosine, _sine))
+            dx, dy = (round(5760 * float(slow.cosine(angle))) for angle in (part, part - 2048))
 
             assert slow.in_wedge(heading, half, dx, dy) == in_wedge(heading, half, dx, dy)
 
 
-def _sine(part):
-    return slow.cosine(part - 2048)
-
-
-def test_look_of_the_narrowest_camera_does_not_see_behind():
+def test_the_narrowest_camera_does_not_see_behind():
     """Rounded to a half angle of 0, its wedge was a line through the robot."""
     lens = Camera(angle_deg=0.01).lens(1280, 1_000_000)
 
@@ -820,108 +521,21 @@ def test_look_of_the_narrowest_camera_does_not_see_behind():
     assert not in_wedge(0, lens.half_angle, -300, 0)
 
 
-@pytest.mark.parametrize("half", [1, 300, 2047])
-def test_in_wedge_excludes_points_right_behind(half):
-    for heading in range(0, 4096, 64):
-        behind = [round(-1000 * float(f(2 * heading))) for f in (slow.cosine, _sine)]
-
-        assert not in_wedge(heading, half, *behind)
-
-
-def test_look_counts_a_user_as_lost_after_its_patience():
-    """Seen in steps 0 and 1, then away: lost in the first step that is `patience` after step 1."""
-    scene = line_of([(50, 0)], steps=9)
-    scene.users[0, 2:, 2] = 1
-
-    seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 100)
-
-    assert [(100, 0, 0, 551, 501), (101, 0, 0, 551, 501)] == seen.places
-    assert [(100, 0, USER_SEEN), (105, 0, USER_LOST)] == seen.events
-
-
-def test_look_does_not_lose_a_user_who_is_back_in_time():
-    scene = line_of([(50, 0)], steps=9)
-    scene.users[0, 2:5, 2] = 1
-
-    seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 100)
-
-    assert [(100, 0, USER_SEEN)] == seen.events
-
-
 @pytest.mark.parametrize(
     ("word", "chance", "expected"),
     [(0, 0, False), (0, 1, True), (2**64 - 1, SURE - 1, False), (2**64 - 1, SURE, True)],
 )
-def test_look_notices_never_at_chance_0_and_always_at_chance_1(word, chance, expected):
+def test_a_look_notices_never_at_chance_0_and_always_at_chance_1(word, chance, expected):
     """Even where the random bits are all zeros or all ones."""
     scene = replace(line_of([(50, 0)]), keys=np.array([key_of_word(word)], np.uint64))
 
-    assert expected == bool(looked(ROOM, slow.Eye(0, 100, 300, chance, 1), scene, 0).sightings)
+    assert expected == sees(slow.Eye(0, 100, 300, chance, 1), scene)
 
 
-def test_look_of_a_robot_that_is_away_sees_nobody():
-    scene = line_of([(50, 0), (0, 0)], steps=3)
-    scene.robot[:, 3] = 1
-
-    assert [] == looked(ROOM, slow.Eye(0, 100, 4096, SURE, 1), scene, 0).sightings
-
-
-def test_look_from_the_corner_of_the_lattice_is_from_outside():
+def test_a_look_from_the_corner_of_the_lattice_is_from_outside():
     """The first camera of a look at (0, 0) was taken to be located, in a triangle that there isn't."""
-    home = home_of([shapely.box(64, 64, 1280, 1280)])
     scene = line_of([(50, 0)])
     scene.robot[:, :2] = 0
 
-    assert [] == looked(home, slow.Eye(0, 5000, 4096, SURE, 1), scene, 0).sightings
-
-
-def test_look_in_the_step_of_a_stop_still_sees_the_other_users():
-    scene = line_of([(50, 0), (60, 0)], steps=5)
-
-    seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), scene, 7, (False, True))
-
-    assert seen.done == 1
-    assert [(7, 0, USER_SEEN), (7, 1, USER_SEEN)] == seen.events
-    assert len(seen.sightings) == 2
-
-
-def test_look_without_users_does_all_steps():
-    empty = Scene(line_of([(0, 0)], 6).robot, np.empty((0, 6, 5), np.int64), np.empty(0, np.uint64))
-
-    seen = looked(ROOM, slow.Eye(0, 100, 300, SURE, 4), empty, 0, (True, True))
-
-    assert Seen(6, [], [], [[]], [-1], [0]) == seen
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"step_us": 0}, "step_us"),
-        ({"step_us": -1}, "step_us"),
-        ({"step_us": 2**61}, "before"),
-        ({"start_us": -1}, "start_us"),
-        ({"start_us": 2**61}, "start_us"),
-        ({"pan_us": 2**61}, "pan_us"),
-        ({"first_other": 2**63 - 1}, "fewer others"),
-        ({"body": 2}, "no such body"),
-    ],
-)
-def test_look_refuses_times_and_bodies_that_are_none(change, message):
-    """A step of no length divided by 0, a long pan never ended, others were read beyond the window."""
-    scene, eye = line_of([(50, 0)]), slow.Eye(0, 100, 300, SURE, 4, pans=(5, 7), pan_us=STEP_US)
-    lenses, errors, rule = kernel_args([eye], scene)
-    window, body, first_other = scene.window(0)
-    times = {key: value for key, value in change.items() if key in rule._fields}
-    pan_us = np.array([change.get("pan_us", STEP_US)])
-
-    with pytest.raises(ValueError, match=message):
-        detect(
-            ROOM.mesh,
-            lenses._replace(pan_us=pan_us),
-            errors,
-            rule._replace(**times),
-            window,
-            change.get("body", body),
-            change.get("first_other", first_other),
-            nothing_known(eye, scene).memory,
-        )
+    home = home_of([shapely.box(64, 64, 1280, 1280)])
+    assert not sees(slow.Eye(0, 5000, 4096, SURE, 1), scene, home)

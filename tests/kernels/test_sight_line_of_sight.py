@@ -11,13 +11,10 @@ from tests.meshed_homes import (
     awkward_points,
     behind_corners,
     home_of,
-    houseexpo,
     shuffled,
-    transformed,
-    turns,
 )
 from tests.reference.line_of_sight import nearest_cells_in_sight as nearest_slowly
-from tests.reference.line_of_sight import vertices_seen, visible, visible_exactly
+from tests.reference.line_of_sight import vertices_seen, visible
 from tests.strategies import homes, quick, seeds
 
 from fleet2d._core import build_fans, vertices_seen_from_point, vertices_seen_from_vertex
@@ -26,58 +23,34 @@ from fleet2d.kernels import (
     locate,
     nearest_cells_in_sight,
     pairs_in_sight,
+    points_in_sight,
 )
 
 EYES, POINTS = 2, 24
-
-
-def _sees_each(mesh, eye, points):
-    """Return which points the eye sees."""
-    return pairs_in_sight(mesh, np.broadcast_to(eye, points.shape), points)
-
-
-def _is_seen_by_each(mesh, eye, points):
-    """Return which points see the eye."""
-    return pairs_in_sight(mesh, points, np.broadcast_to(eye, points.shape))
-
-
-def sees(home, eye, point):
-    """Return one verdict."""
-    return bool(line_of_sight(home.mesh, *eye, locate(home.mesh, *eye), *point))
 
 
 def check_against_every_wall(home, mesh, rng):
     """Compare verdicts from awkward eyes to awkward points, both ways; return how many are seen."""
     count = 0
     for eye in awkward_points(home, rng, EYES):
-        points = np.concatenate(
-            [
-                awkward_points(home, rng, POINTS),
-                behind_corners(home, eye, rng, POINTS),
-                eye[None],
-            ]
-        )
+        others = awkward_points(home, rng, POINTS), behind_corners(home, eye, rng, POINTS)
+        points = np.concatenate([*others, eye[None]])
+        eyes = np.broadcast_to(eye, points.shape)
         expected = visible(home.walls, eye, points)
-        assert np.array_equal(expected, _sees_each(mesh, eye, points))
-        assert np.array_equal(expected, _is_seen_by_each(mesh, eye, points))
+        assert np.array_equal(expected, pairs_in_sight(mesh, eyes, points))
+        assert np.array_equal(expected, pairs_in_sight(mesh, points, eyes))
+        assert np.array_equal(expected, points_in_sight(mesh, *eye.tolist(), points))
         count += int(expected.sum())
     return count
 
 
 @quick
 @given(homes(), seeds())
-def test_line_of_sight_agrees_with_every_wall_and_is_symmetric(polygons, seed):
-    home = home_of(polygons)
-
-    check_against_every_wall(home, home.mesh, np.random.default_rng(seed))
-
-
-@quick
-@given(homes(), seeds())
-def test_line_of_sight_does_not_depend_on_the_mesh(polygons, seed):
+def test_line_of_sight_agrees_with_every_wall_in_both_directions_and_any_mesh(polygons, seed):
     home, rng = home_of(polygons), np.random.default_rng(seed)
 
-    check_against_every_wall(home, shuffled(home.mesh, rng), rng)
+    for mesh in (home.mesh, shuffled(home.mesh, rng)):
+        check_against_every_wall(home, mesh, rng)
 
 
 def test_line_of_sight_agrees_with_every_wall_of_real_homes(shared_data):
@@ -87,85 +60,37 @@ def test_line_of_sight_agrees_with_every_wall_of_real_homes(shared_data):
         assert check_against_every_wall(home, home.mesh, rng) > 50
 
 
-@pytest.mark.parametrize("name", ["658e5214673c7a4e25b458e56bdb6144"])
-def test_line_of_sight_is_the_same_in_the_turned_and_mirrored_home(shared_data, name):
-    home = houseexpo(shared_data / "houseexpo" / f"{name}.json")
-    rng = np.random.default_rng(2)
-    eyes = awkward_points(home, rng, 6)
-    points = np.concatenate([awkward_points(home, rng, 40), home.mesh.vertices])
-    before = [_sees_each(home.mesh, eye, points) for eye in eyes]
-    assert 0.02 < np.mean(before) < 0.6
-
-    for turn in turns(home):
-        turned = transformed(home, turn)
-        moved = turn(points.astype(float)).astype(np.int64)
-        for eye, expected in zip(turn(eyes.astype(float)).astype(np.int64), before, strict=True):
-            assert np.array_equal(expected, _sees_each(turned.mesh, eye, moved))
+def sees(home, eye, point):
+    """Return one verdict."""
+    return line_of_sight(home.mesh, *eye, locate(home.mesh, *eye), *point)
 
 
-def test_the_two_twins_of_the_tests_agree():
-    home = home_of([shapely.box(0, 0, 640, 640).difference(shapely.box(200, 200, 400, 300))])
-    points = np.array([(x, y) for x in range(10, 640, 57) for y in range(10, 640, 57)])
-    points = points[visible(home.walls, points[0], points) | (points[:, 0] < 200)]
-
-    expected = [visible_exactly(home.walls.tolist(), (10, 10), (x, y)) for x, y in points.tolist()]
-
-    assert expected == visible(home.walls, points[0], points).tolist()
-
-
-HALL_WITH_PILLAR = home_of(
-    [shapely.box(0, 0, 1280, 1280).difference(shapely.box(512, 512, 768, 768))]
+HALL = shapely.box(0, 0, 1280, 1280)
+HALL_WITH_PILLAR = home_of([HALL - shapely.box(512, 512, 768, 768)])
+CORNER_TO_CORNER = home_of(
+    [HALL - shapely.box(200, 200, 600, 600) - shapely.box(600, 600, 900, 900)]
 )
-PILLARS_CORNER_TO_CORNER = home_of(
-    [
-        Polygon(
-            [(0, 0), (1280, 0), (1280, 1280), (0, 1280)],
-            [
-                [(200, 200), (600, 200), (600, 600), (200, 600)],
-                [(600, 600), (900, 600), (900, 900), (600, 900)],
-            ],
-        )
-    ]
-)
-PILLAR_AT_WALL = home_of(
-    [Polygon([(0, 0), (1280, 0), (1280, 1280), (0, 1280)], [[(640, 0), (800, 300), (480, 300)]])]
-)
-CORRIDOR = home_of([shapely.box(128, 128, 3200, 192)])
+PILLAR_AT_WALL = home_of([HALL - Polygon([(640, 0), (800, 300), (480, 300)])])
 
 
 @pytest.mark.parametrize(
     ("home", "eye", "point", "expected"),
     [
-        pytest.param(HALL_WITH_PILLAR, (100, 100), (100, 100), True, id="itself"),
         pytest.param(HALL_WITH_PILLAR, (100, 640), (1100, 640), False, id="through a pillar"),
-        pytest.param(HALL_WITH_PILLAR, (256, 1024), (768, 512 - 256), False, id="past a corner"),
         pytest.param(HALL_WITH_PILLAR, (384, 640), (640, 384), False, id="touches a corner"),
         pytest.param(HALL_WITH_PILLAR, (382, 640), (638, 384), True, id="just misses a corner"),
-        pytest.param(HALL_WITH_PILLAR, (256, 256), (510, 510), True, id="up to a corner"),
-        pytest.param(HALL_WITH_PILLAR, (256, 256), (512, 512), False, id="at a corner"),
         pytest.param(HALL_WITH_PILLAR, (256, 512), (1024, 512), False, id="along a wall"),
         pytest.param(HALL_WITH_PILLAR, (256, 511), (1024, 511), True, id="beside a wall"),
-        pytest.param(HALL_WITH_PILLAR, (100, 640), (512, 640), False, id="a point on a wall"),
-        pytest.param(HALL_WITH_PILLAR, (512, 640), (100, 640), False, id="from a wall"),
         pytest.param(HALL_WITH_PILLAR, (512, 640), (512, 640), False, id="itself on a wall"),
-        pytest.param(HALL_WITH_PILLAR, (512, 512), (100, 100), False, id="from a corner"),
-        pytest.param(HALL_WITH_PILLAR, (640, 640), (100, 100), False, id="from inside a pillar"),
         pytest.param(HALL_WITH_PILLAR, (640, 640), (640, 640), False, id="itself in a pillar"),
-        pytest.param(HALL_WITH_PILLAR, (100, 100), (640, 640), False, id="into a pillar"),
-        pytest.param(HALL_WITH_PILLAR, (100, 100), (-50, 100), False, id="out of the home"),
         pytest.param(HALL_WITH_PILLAR, (-50, 100), (100, 100), False, id="into the home"),
         pytest.param(HALL_WITH_PILLAR, (100, 100), (0, 0), False, id="into a corner of the home"),
-        pytest.param(PILLARS_CORNER_TO_CORNER, (500, 700), (700, 500), False, id="through a touch"),
-        pytest.param(PILLARS_CORNER_TO_CORNER, (500, 700), (580, 620), True, id="before a touch"),
+        pytest.param(CORNER_TO_CORNER, (500, 700), (700, 500), False, id="through a touch"),
         pytest.param(PILLAR_AT_WALL, (100, 150), (1200, 150), False, id="pillar at a wall"),
-        pytest.param(PILLAR_AT_WALL, (100, 301), (1200, 301), True, id="over a pillar at a wall"),
-        pytest.param(CORRIDOR, (130, 190), (3198, 130), True, id="along a corridor"),
-        pytest.param(CORRIDOR, (130, 190), (3230, 130), False, id="beyond a corridor"),
     ],
 )
 def test_line_of_sight(home, eye, point, expected):
-    assert expected == sees(home, eye, point)
-    assert expected == sees(home, point, eye)
+    assert expected == sees(home, eye, point) == sees(home, point, eye)
     assert [expected] == visible(home.walls, np.array(eye), np.array([point])).tolist()
 
 

@@ -135,25 +135,3 @@ def test_the_perceived_posture_follows_from_the_draw():
     draws = (0, quarter - 1, quarter, 3 * quarter - 1, 3 * quarter, k.ONE - 1)
     assert [0, 0, 1, 1, 2, 2] == [_core.perceived_posture(table, 0, 1, draw) for draw in draws]
     assert [2, 2] == [_core.perceived_posture(table, 0, 2, draw) for draw in (0, k.ONE - 1)]
-
-
-@pytest.mark.parametrize("far", [2**30 + 1, 2**31, 2**62, -(2**63)])
-def test_places_farther_away_than_any_home_is_wide_are_refused(far):
-    """The square of their distance left 64 bits: it was in a bin before the first."""
-    keys = np.zeros((1, 3, len(k.UserDraw)), np.uint64)
-    for dx, dy in ((far, 0), (0, far), (far, far)):
-        for ask in (
-            lambda dx=dx, dy=dy: _core.length(dx, dy),
-            lambda dx=dx, dy=dy: _core.distance_bin(BY_ALL, 0, dx, dy),
-            lambda dx=dx, dy=dy: _core.steady_chance(BY_ALL, 0, 0, dx, dy, 0, 0, 1),
-            lambda dx=dx, dy=dy: _core.perceived_offset(BY_ALL, keys, 0, 0, 7, dx, dy),
-            lambda dx=dx, dy=dy: _core.turn_and_stretch(dx, dy, 5, 100, 100),
-        ):
-            with pytest.raises(ValueError, match=r"within 2\*\*30"):
-                ask()
-
-
-@pytest.mark.parametrize("distance", [0, -5, 2**40, 2**62])
-def test_lengths_that_nothing_can_be_stretched_from_are_refused(distance):
-    with pytest.raises(ValueError, match="distance must be"):
-        _core.turn_and_stretch(300, 40, 5, distance, 400)

@@ -22,7 +22,6 @@ from fleet2d.kernels import (
     mark_spans,
     points_in_reach,
     points_in_sight,
-    rasterize_cells,
 )
 
 SINES = np.array([half_sine(half) for half in range(8192)], np.int64)
@@ -102,42 +101,3 @@ def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(shar
                 )
                 compared += expected.size
     assert compared > 200_000 * (number + 1)
-
-
-def test_everything_in_view_all_round_is_free(shared_data):
-    for home in list(all_homes(shared_data))[:10]:
-        free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
-        x, y = home.cells[len(home.cells) // 2].tolist()
-        in_view = mask_in_view(home, home.mesh, (x, y, 0), Reach(0, 10**12, 4096))
-        assert in_view[y // 64, x // 64]
-        assert not (in_view & ~free).any()
-
-
-def test_no_camera_in_a_wall_sees_a_cell():
-    for x, y in [(128, 200), (600, 350), (0, 0), (-5, 9), (5000, 20)]:
-        assert not mask_in_view(ROOM, ROOM.mesh, (x, y, 0), Reach(0, 10**9, 4096)).any()
-
-
-def test_the_range_includes_its_ends_and_nothing_nearer():
-    eye = (64 * 6 + 33, 64 * 3 + 33, 0)
-
-    in_view = mask_in_view(ROOM, ROOM.mesh, eye, Reach(64**2, (2 * 64) ** 2, 1))
-
-    assert np.argwhere(in_view).tolist() == [[3, 7], [3, 8]]
-
-
-def test_numbers_without_a_meaning_are_refused():
-    mesh, mask = ROOM.mesh, np.zeros((9, 9), np.bool_)
-
-    for reach, message in [
-        (Reach(-1, 100, 1), "near_squared and far_squared"),
-        (Reach(0, 2**52, 1), "near_squared and far_squared"),
-        (Reach(0, 100, -1), "half_angle"),
-    ]:
-        with pytest.raises(ValueError, match=message):
-            cells_in_view(mesh, 200, 200, 0, reach, 9, 9)
-    with pytest.raises(ValueError, match="rows and columns"):
-        cells_in_view(mesh, 200, 200, 0, Reach(0, 100, 1), -1, 9)
-    for span in ([9, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 9]):
-        with pytest.raises(ValueError, match="spans must lie in the mask"):
-            mark_spans(np.array([span], np.int32), mask)

@@ -1,16 +1,11 @@
 import numpy as np
-import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference.chambers import nearest_labels
 
-from fleet2d.floorplan.mesh import build_mesh
 from fleet2d.kernels import (
     fill_from_neighbors,
     label_frames,
-    line_of_sight,
-    locate,
-    pairs_in_sight,
     spread_labels,
 )
 
@@ -30,19 +25,6 @@ def test_labels_spread_as_growing_them_step_by_step_does(drawn):
     labels, mask = drawn
 
     assert np.array_equal(nearest_labels(labels, mask), spread_labels(labels, mask))
-
-
-def test_pairs_see_each_other_as_one_by_one():
-    mesh = build_mesh([shapely.box(0, 0, 640, 640) - shapely.box(256, 0, 320, 512)], 10, 10)
-    rng = np.random.default_rng(3)
-    eyes, places = rng.integers(-20, 660, (2, 300, 2))
-
-    expected = [
-        line_of_sight(mesh, *eye, locate(mesh, *eye), *place)
-        for eye, place in zip(eyes.tolist(), places.tolist(), strict=True)
-    ]
-
-    assert expected == pairs_in_sight(mesh, eyes, places).tolist()
 
 
 @given(labelled())

@@ -73,20 +73,6 @@ def test_there_is_no_way_to_a_goal_that_is_taken_or_walled_in_or_outside():
     assert routes.around(0, 300, 3000, 300, NOBODY) is None
 
 
-@pytest.mark.parametrize(
-    ("discs", "message"),
-    [
-        (np.zeros((1, 2), np.int64), "n, 3"),
-        (np.array([[0, 0, -1]]), "distance to a disc"),
-        (np.array([[1 << 40, 0, 1]]), r"2\*\*30"),
-    ],
-)
-def test_discs_that_cannot_be_are_refused(discs, message):
-    routes = routes_of(home_of([shapely.box(0, 0, 640, 640)]))
-    with pytest.raises(ValueError, match=message):
-        routes.around(100, 100, 200, 200, discs)
-
-
 @pytest.mark.parametrize("seed", range(40))
 def test_a_place_beside_is_the_clear_cell_that_trying_all_of_them_finds(seed):
     random = np.random.default_rng(seed)
@@ -102,9 +88,3 @@ def test_a_place_beside_is_the_clear_cell_that_trying_all_of_them_finds(seed):
     slack = int(random.integers(0, 4)) * SUB
     floor = parts, 1, rooms, room
     assert place_beside(*floor, place, start, slack, discs) == slow.place_beside(floor, place, start, slack, discs)  # fmt: skip
-
-
-def test_a_place_outside_of_the_cells_is_refused():
-    cells = np.zeros((4, 4), np.int32), 0, np.zeros((4, 4), np.int16), -1
-    with pytest.raises(ValueError, match="place must be in a cell"):
-        place_beside(*cells, (4 * SUB, 0), (0, 0), 0, NOBODY)

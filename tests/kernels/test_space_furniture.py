@@ -67,14 +67,3 @@ def test_group_larger_than_the_room_has_no_place():
     assert 0 == len(group_places(floor, nothing, SMALL._replace(depth=6)))
     assert 0 == len(group_places(floor, nothing, SMALL._replace(front=6)))
     assert 0 == len(group_places(floor, ~nothing, SMALL))
-
-
-def test_arrays_of_another_shape_are_refused():
-    floor, occupied = floor_of((4, 6), 1.0, 0)
-
-    with pytest.raises(ValueError, match="must have one shape"):
-        group_places(floor, occupied[1:], SMALL)
-    with pytest.raises(ValueError, match="before_walls must be"):
-        group_places(floor._replace(before_walls=floor.before_walls[:3]), occupied, SMALL)
-    with pytest.raises(ValueError, match="width, depth and far"):
-        group_places(floor, occupied, SMALL._replace(far=0))

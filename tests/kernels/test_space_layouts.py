@@ -116,31 +116,6 @@ def test_wings_of_every_kind_occur():
     assert 0 < sum(map(bool, made)) < len(made)
 
 
-def test_wrong_trees_and_slots_are_refused():
-    areas = areas_of(0)
-    sides, mouths = np.array([0, 0, 90, 90]), np.zeros((0, 4), np.int64)
-    starts = np.zeros(1, np.int64)
-
-    for nodes, message in (
-        ([(-1, 2), (0, 100)], "end within nodes"),
-        ([(ROOMS, 100)], "indices of areas"),
-        ([(0, 0)], "1 to 100 %"),
-        ([(-3, 1), (0, 100)], "a cut must be"),
-        ([(-1, 1)] * 70 + [(0, 100)], "64 nodes deep"),
-    ):
-        trees = Divisions(np.array(nodes, np.int64), starts)
-        with pytest.raises(ValueError, match=message):
-            squarest_rooms(trees, areas, sides, mouths)
-    with pytest.raises(ValueError, match="above 0"):
-        strip_rooms(np.array([(0, -1, 0)]), np.zeros(1), 100, 20, 240)
-    back = np.array([(1, -1, -60)])
-    corridor = CorridorRule(11, 24, False, -1)
-    with pytest.raises(ValueError, match="deeper than 0"):
-        wing_rooms(np.array([(0, -1, 0)]), back, areas, corridor, 50, 44, 124)
-    with pytest.raises(ValueError, match="indices of limits"):
-        is_promising(np.array([(ROOMS, 0, 0, 9, 9)]), LIMITS)
-
-
 ONE = np.array([(0, -1, 0)])
 TWO = np.array([(0, -1, 0), (1, -1, 0)])
 OTHERS = np.array([(2, -1, 0), (3, -1, 0)])

@@ -1,7 +1,6 @@
 """Where furniture cuts the space of a body: the kernels beside their slow twins."""
 
 import numpy as np
-import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
@@ -95,11 +94,3 @@ def test_a_box_between_a_slanted_wall_and_another_may_cut():
 
     assert 1 == add_obstacles(tent, np.array([[110, 0, 130, 20]]), 20, 8)[1]
     assert 0 == add_obstacles(tent, np.array([[340, 0, 400, 20]]), 20, 8)[1]
-
-
-def test_sizes_that_fit_nothing_are_refused():
-    room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
-    with pytest.raises(ValueError, match="half must be"):
-        add_obstacles(room, np.zeros((0, 4), np.int64), 4, 5)
-    with pytest.raises(ValueError, match="numbers must be"):
-        add_obstacles(np.where(np.arange(10) == 8, -1, room), np.zeros((0, 4), np.int64), 4, 4)

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +17,9 @@ from tests.reference.random import random_bell, random_below, random_bits
 
 import fleet2d.kernels as k
 from fleet2d import _core
+from fleet2d.kernels import I64
 
 Point = tuple[int, int]
-LOST, SEEN = 0, 1
-Method = Callable[[int, int, int], int]
-"""Camera, user and step, from the first one on, to points in view, bit i for number i."""
 
 
 class Eye(NamedTuple):
@@ -41,14 +40,6 @@ class Eye(NamedTuple):
     points: int = 0
 
 
-@dataclass
-class Known:
-    """What the robot carries along for one identity."""
-
-    noticed: int
-    seen: bool
-
-
 class Body(NamedTuple):
     """Where somebody is in a step."""
 
@@ -60,10 +51,11 @@ class Body(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """A body that hides others: where it is in each step, and its radius."""
+    """A body that hides others: where it is in each step, its radius, and its height by posture."""
 
     poses: list[Body]
     radius: int
+    tops: list[int]
 
 
 class Piece(NamedTuple):
@@ -75,18 +67,16 @@ class Piece(NamedTuple):
 
 @dataclass
 class Heights:
-    """How high cameras, bodies and furniture are [mm].
+    """How high cameras, users and furniture are [mm].
 
     Attributes:
         eyes: Of each camera, by the posture of its owner.
         points: Of the points of each user, by camera and posture.
-        tops: Of each obstacle by number, as they are given to `detect`, by posture.
         furniture: All pieces.
     """
 
     eyes: list[list[int]]
     points: list[list[list[list[int]]]]
-    tops: dict[int, list[int]]
     furniture: list[Piece]
 
     def base(self, body):
@@ -95,39 +85,48 @@ class Heights:
         on = [p.top for p in self.furniture if shapely.Polygon(p.corners).covers(here)]
         return max(on, default=0) if body.posture == 2 else 0
 
-    def line(self, camera, user, point, owner, body):
-        """Return the heights of a camera and of a point of a user."""
-        to = self.base(body) + self.points[camera][user][body.posture][point]
-        return self.base(owner) + self.eyes[camera][owner.posture], to
+
+class Watched(NamedTuple):
+    """Who looks at whom, and what may hide them.
+
+    Attributes:
+        walls: int64 (w, 4), pieces of wall.
+        robot: Where it is in each step.
+        users: Where each of them is in each step.
+        radius: Of the users.
+        keys: The stream of each user, for the first camera; later cameras have later ones.
+        step_us: Length of a step.
+        method: Which points of a user a camera has in view at a step, instead of lines of sight.
+        obstacles: The users by number, and others by negative ones, that hide each other.
+        heights: How high all are; None if that doesn't matter.
+    """
+
+    walls: I64
+    robot: list[Body]
+    users: list[list[Body]]
+    radius: int
+    keys: list[int]
+    step_us: int
+    method: Callable | None
+    obstacles: dict[int, Obstacle]
+    heights: Heights | None
 
 
-def line_is_low(eye, to, part, top):
-    """Return whether a line from a height to another is at a part of its way at a top or below."""
-    return eye + part * (to - eye) <= top
+@dataclass
+class Carried:
+    """What a robot carries from span to span.
 
+    Attributes:
+        noticed: When each identity was noticed last; the last one is somebody unknown.
+        seen: Whether each is taken to be there.
+        errors: How each camera errs; None for one that doesn't.
+        waiting: Sightings that the robot will get later.
+    """
 
-def _furniture_hides(heights, at, point, eye, to):
-    """Return whether the line meets an edge of a piece, and is not above it there."""
-    px, py = point[0] - at.x, point[1] - at.y
-    for piece in heights.furniture:
-        corners = [(x - at.x, y - at.y) for x, y in piece.corners]
-        for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
-            across = px * (by - ay) - py * (bx - ax)
-            ends = [(ax, ay), (bx, by)]
-            parts = []
-            if across != 0:
-                part = Fraction(ax * (by - ay) - ay * (bx - ax), across)
-                where = Fraction(ax * py - ay * px, across)
-                if 0 <= where <= 1:
-                    parts = [part]
-            elif px * ay == py * ax and (px, py) != (0, 0):  # along the line
-                parts = [Fraction(px * x + py * y, px * px + py * py) for x, y in ends]
-            if any(
-                0 <= p <= 1 and line_is_low(Fraction(eye), Fraction(to), p, piece.top)
-                for p in parts
-            ):
-                return True
-    return False
+    noticed: list[int]
+    seen: list[bool]
+    errors: list
+    waiting: list = field(default_factory=list)
 
 
 class Ghost(NamedTuple):
@@ -161,10 +160,9 @@ def in_wedge(heading, half_angle, dx, dy):
 def offset(forward, left, heading):
     """Return a place in the robot's frame in that of the home, by sines of 30 binary digits."""
     along, up = (round(f(2 * heading) * 2**30) for f in (cosine, sine))
-    half = Fraction(1, 2)
     return (
-        math.floor(Fraction(forward * along - left * up, 2**30) + half),
-        math.floor(Fraction(forward * up + left * along, 2**30) + half),
+        half_up(Fraction(forward * along - left * up, 2**30)),
+        half_up(Fraction(forward * up + left * along, 2**30)),
     )
 
 
@@ -195,12 +193,12 @@ class Errors:
     start_us: int = 0
 
     def __post_init__(self):
-        users = self.tables.keys.shape[1]
-        self.keys = self.tables.keys[self.camera].tolist()
-        self.ghost_keys = self.tables.ghost_keys[self.camera].tolist()
-        self.row = self.tables.table[self.camera].tolist()
-        self.draws = [None] * users  # step and value of the last one
-        self.tracks = [None] * users  # last step, and taken for whom
+        self.keys, self.ghost_keys, self.row = (
+            of[self.camera].tolist()
+            for of in (self.tables.keys, self.tables.ghost_keys, self.tables.table)
+        )
+        self.draws = {}  # step and value of the last one
+        self.tracks = {}  # last step, and taken for whom
 
     def _share(self, user, purpose, step):
         return random_bits(self.keys[user][purpose], step) // 2**33
@@ -208,20 +206,13 @@ class Errors:
     def _noise(self, key, counter, noise):
         return half_up(Fraction(random_bell(key, counter) * noise, 2**16))
 
-    def notices(
-        self, u, now, step_us, heading, away, user,
-        shown, chance,
-    ):  # fmt: skip
+    def notices(self, u, now, step_us, heading, away, user, shown, chance):
         """Return whether a user who is `away` from the camera is noticed."""
-        last, value = self.draws[u], 0
-        lasts = False
-        if last is not None and self.row[k.TablePart.STAY] != 0:
-            share = self._share(u, k.UserDraw.ATTEND, now)
-            lasts = share < _core.persistence_chance(self.tables.table, self.camera, now - last[0])
-        if last is not None and lasts:
-            value = last[1]
-        else:
-            value = random_bits(self.keys[u][k.UserDraw.DETECT], now) // 2**11
+        value = random_bits(self.keys[u][k.UserDraw.DETECT], now) // 2**11
+        if u in self.draws and self.row[k.TablePart.STAY] != 0:
+            before, last = self.draws[u]
+            lasts = _core.persistence_chance(self.tables.table, self.camera, now - before)
+            value = last if self._share(u, k.UserDraw.ATTEND, now) < lasts else value
         self.draws[u] = now, value
         minute = (self.start_us + now * step_us) // 60_000_000 % 1440
         steady = _core.steady_chance(
@@ -231,22 +222,15 @@ class Errors:
 
     def taken_for(self, u, now, away, patience):
         """Return for whom a noticed user is taken; -1 for nobody known."""
-        before = self.tracks[u]
-        if before is not None and self.row[k.TablePart.KEEPS] == 1 and now - before[0] < patience:
-            identity = before[1]
-        else:
+        before, identity = self.tracks.get(u, (-math.inf, -1))
+        if self.row[k.TablePart.KEEPS] == 0 or now - before >= patience:
             bin_ = _core.distance_bin(self.tables.table, self.camera, *away)
-            right, mistaken = (
-                self.row[k.TablePart.RIGHT + bin_],
-                self.row[k.TablePart.MISTAKEN + bin_],
-            )
-            draw, identity = self._share(u, k.UserDraw.IDENTIFY, now), -1
-            if draw < right:
-                identity = u
-            elif draw < right + mistaken:
-                other = self._share(u, k.UserDraw.MISTAKE, now)
-                confusion = self.tables.confusion[self.camera, u].tolist()
-                identity = next((i for i, end in enumerate(confusion) if other < end), -1)
+            right = self.row[k.TablePart.RIGHT + bin_]
+            wrong = right + self.row[k.TablePart.MISTAKEN + bin_]
+            other = self._share(u, k.UserDraw.MISTAKE, now)
+            confused = _outcome(self.tables.confusion[self.camera, u], other)
+            outcome = _outcome([right, wrong], self._share(u, k.UserDraw.IDENTIFY, now))
+            identity = (u, confused if confused < len(self.keys) else -1, -1)[outcome]
         self.tracks[u] = now, identity
         return identity
 
@@ -254,45 +238,44 @@ class Errors:
         """Return x and y beside where the user is, heading and posture, as perceived."""
         table, c = self.tables.table, self.camera
         dx, dy = _core.perceived_offset(table, self.tables.keys, c, u, now, *away)
-        turn = self._noise(
-            self.keys[u][k.UserDraw.HEADING], now, self.row[k.TablePart.HEADING_NOISE]
-        )
-        posture = _core.perceived_posture(
-            table, c, user.posture, self._share(u, k.UserDraw.POSTURE, now)
-        )
-        return dx - away[0], dy - away[1], (user.heading + turn) % 4096, posture
+        noise = self.row[k.TablePart.HEADING_NOISE]
+        heading = user.heading + self._noise(self.keys[u][k.UserDraw.HEADING], now, noise)
+        draw = self._share(u, k.UserDraw.POSTURE, now)
+        posture = _core.perceived_posture(table, c, user.posture, draw)
+        return dx - away[0], dy - away[1], heading % 4096, posture
 
     def ghosts(self, walls, eye, at, heading, now):
-        """Return the false positives of a look."""
+        """Yield the false positives of a look."""
         if not self.tables.has_ghosts[self.camera]:
-            return []
-        of = dict(zip(k.GhostDraw, self.ghost_keys, strict=True))
-        keys = {purpose: random_bits(key, now) for purpose, key in of.items()}
-        draw = random_bits(of[k.GhostDraw.COUNT], now) // 2**33
-        found = []
-        for number in range(_outcome(self.tables.ghosts[self.camera].tolist(), draw)):
-            share = random_bits(keys[k.GhostDraw.SOURCE], number) // 2**33
-            source = _outcome(self.tables.source[self.camera].tolist(), share)
+            return
+        keys = [random_bits(key, now) for key in self.ghost_keys]
+
+        def draw(of, purpose, number):
+            share = random_bits(keys[purpose], number) // 2**33
+            return _outcome(of[self.camera], share)
+
+        count = random_bits(self.ghost_keys[k.GhostDraw.COUNT], now) // 2**33
+        for number in range(_outcome(self.tables.ghosts[self.camera], count)):
+            source = draw(self.tables.source, k.GhostDraw.SOURCE, number)
             key = random_bits(keys[k.GhostDraw.PLACE], number)
             place = self._place(walls, eye, at, heading, source, key)
-            if place is None:
-                continue
-            share = random_bits(keys[k.GhostDraw.IDENTITY], number) // 2**33
-            who = _outcome(self.tables.looks_like[self.camera].tolist(), share)
-            faces = random_below(keys[k.GhostDraw.HEADING], number, 4096)
-            found.append(Ghost(*place, faces, who if who < len(self.keys) else -1))
-        return found
+            if place is not None:
+                who = draw(self.tables.looks_like, k.GhostDraw.IDENTITY, number)
+                faces = random_below(keys[k.GhostDraw.HEADING], number, 4096)
+                yield Ghost(*place, faces, who if who < len(self.keys) else -1)
 
     def _place(self, walls, eye, at, heading, source, key):
         """Return where a false positive of a source appears, if it does."""
-        here = np.array([at.x, at.y])
+
+        def sees(x, y):
+            return visible(walls, np.array(at[:2]), np.array([(x, y)]))[0]
+
         if source > 0:
             x, y, noise = self.tables.spot[self.camera, source].tolist()
             dx, dy = x - at.x, y - at.y
-            if not _in_range(eye, dx, dy) or not in_wedge(heading, eye.half_angle, dx, dy):
-                return None
             there = (x + self._noise(key, 0, noise), y + self._noise(key, 1, noise))
-            return there if visible(walls, here, np.array([there]))[0] else None
+            in_reach = _in_range(eye, dx, dy) and in_wedge(heading, eye.half_angle, dx, dy)
+            return there if in_reach and sees(*there) else None
         half = min(eye.half_angle, 4096)
         for attempt in range(1024):
             part = random_below(key, 2 * attempt, 2**20)
@@ -301,121 +284,106 @@ class Errors:
             dx, dy = (
                 half_up(Fraction(reach * round(f(turned) * 2**30), 2**30)) for f in (cosine, sine)
             )
-            there = (at.x + dx, at.y + dy)
-            if visible(walls, here, np.array([there]))[0]:
-                return there
+            if sees(at.x + dx, at.y + dy):
+                return at.x + dx, at.y + dy
         return None
 
 
 def _outcome(sums, draw):
-    return next((i for i, end in enumerate(sums) if draw < end), len(sums))
+    return int(np.searchsorted(sums, draw, side="right"))
 
 
-class Look(NamedTuple):
-    """What came of looking.
+def detect(watched, eyes, first, carried, stops):
+    """Look at all users in each step from the first on, and tell what becomes known.
 
-    Sightings have the columns of the kernel's; events are (step, identity, kind).
+    Returns the number of steps done, the sightings with the columns of the kernel, the events
+    (step, identity, kind), and by camera and user how often they were in view and noticed. It ends
+    with a step in which somebody is lost or seen, if `stops` says so.
     """
-
-    done: int
-    sightings: list[tuple[int, ...]]
-    events: list[tuple[int, int, int]]
-    counts: list[list[list[int]]]
-
-
-def detect(
-    walls,
-    eyes,
-    robot,
-    users,
-    radii,
-    keys,
-    step_us,
-    first,
-    known,
-    stops,
-    errors=(),
-    method=None,
-    obstacles=None,
-    heights=None,
-):
-    """Look at all users in each step, and tell what becomes known.
-
-    Args:
-        walls: int64 (w, 4), pieces of wall.
-        eyes: The cameras.
-        robot: Where it is in each step.
-        users: Where each of them is in each step.
-        radii: Of the users.
-        keys: The streams of each camera's users, of one that doesn't err.
-        step_us: Length of a step.
-        first: The first step.
-        known: What is carried along for each identity; updated.
-        stops: Whether it ends when somebody is lost, and when somebody is seen.
-        errors: How each camera errs; None for one that doesn't.
-        method: Which points of a user a camera has in view at a step, instead of lines of sight.
-        obstacles: The users by number, and others by negative ones, that hide each other.
-        heights: How high all are; None if that doesn't matter.
-    """
-    sightings = []
-    events = []
-    waiting = []
-    counts = [[[0, 0] for _ in users] for _ in eyes]
+    sightings, events = [], []
+    counts = [[[0, 0] for _ in watched.users] for _ in eyes]
     patience = max(eye.patience for eye in eyes)
-    for j, body in enumerate(robot):
-        step, stop = first + j, False
+    for j, robot in enumerate(watched.robot):
+        step = first + j
         for c, eye in enumerate(eyes):
-            if body.away or step % eye.period != 0:
-                continue
-            at, towards = pose_of(eye, body, step * step_us)
-            errs = errors[c] if errors else None
-            for u, user in enumerate(users):
-                if user[j].away:
-                    continue
-                points, identity = body_points(eye, radii[u]), u
-                in_view = {i for i in range(len(points)) if method and method(c, u, j) >> i & 1}
-                if method is None:
-                    in_view = _points_in_view(walls, eye, at, towards, user[j], points)
-                between = {n: body for n, body in (obstacles or {}).items() if n != u}
-                lines = _lines(heights, c, u, in_view, body, user[j])
-                shown = _count_shown(at, user[j], points, lines, between, j, heights)
-                if shown == 0:
-                    continue
-                counts[c][u][0] += 1
-                away = user[j].x - at.x, user[j].y - at.y
-                seems = truth = (user[j].x, user[j].y, user[j].heading, user[j].posture)
-                if errs is None:
-                    noticed = random_bits(keys[c][u], step) // 2**11 < eye.chance
-                else:
-                    noticed = errs.notices(
-                        u, step, step_us, towards, away, user[j], shown, eye.chance
-                    )
-                if noticed and errs is not None:
-                    identity = errs.taken_for(u, step, away, patience)
-                    dx, dy, heading, posture = errs.perceived(u, step, away, user[j])
-                    seems = (user[j].x + dx, user[j].y + dy, heading, posture)
-                if noticed:
-                    counts[c][u][1] += 1
-                    waiting.append((step + eye.latency, c, u, identity, *seems, *truth))
-            for ghost in errs.ghosts(walls, eye, at, towards, step) if errs else ():
-                seems = (ghost.x, ghost.y, ghost.heading, 0)
-                waiting.append((step + eye.latency, c, -1, ghost.identity, *seems, *seems))
-        told = sorted((row for row in waiting if row[0] == step), key=lambda row: row[1])
-        waiting = [row for row in waiting if row[0] > step]
+            if not robot.away and step % eye.period == 0:
+                rows = _look(watched, c, eye, j, step, carried.errors[c], patience, counts[c])
+                carried.waiting += [(step + eye.latency, c, *row) for row in rows]
+        told = sorted((row for row in carried.waiting if row[0] == step), key=lambda row: row[1])
+        carried.waiting = [row for row in carried.waiting if row[0] > step]
         sightings += told
         for row in told:
-            known[row[3]].noticed = step  # -1, somebody unknown, is the last one
-        for identity, memory in enumerate(known):
-            lately = memory.seen and step - memory.noticed < patience
-            seen = memory.noticed == step or lately
-            if seen != memory.seen:
-                memory.seen = seen
-                kind = SEEN if seen else LOST
-                events.append((step, identity, kind))
-                stop |= stops[kind]
+            carried.noticed[row[3]] = step  # -1 is the last one
+        stop = False
+        for identity, noticed in enumerate(carried.noticed):
+            was_seen = carried.seen[identity]
+            is_seen = noticed == step or (was_seen and step - noticed < patience)
+            if is_seen != was_seen:
+                carried.seen[identity] = is_seen
+                events.append((step, identity, int(is_seen)))
+                stop |= stops[is_seen]
         if stop:
-            return Look(j + 1, sightings, events, counts)
-    return Look(len(robot), sightings, events, counts)
+            return j + 1, sightings, events, counts
+    return len(watched.robot), sightings, events, counts
+
+
+def _look(watched, c, eye, j, step, errors, patience, counts):
+    """Yield what a camera perceives: user, identity, and x, y, heading and posture as seen and true."""
+    robot = watched.robot[j]
+    at, towards = pose_of(eye, robot, step * watched.step_us)
+    for u, poses in enumerate(watched.users):
+        user = poses[j]
+        shown = 0 if user.away else sum(_shown_points(watched, c, eye, at, towards, u, j))
+        if shown == 0:
+            continue
+        counts[u][0] += 1
+        away, truth = (user.x - at.x, user.y - at.y), (user.x, user.y, user.heading, user.posture)
+        if errors is None:
+            if random_bits((watched.keys[u] + c) % 2**64, step) // 2**11 < eye.chance:
+                counts[u][1] += 1
+                yield u, u, *truth, *truth
+        elif errors.notices(u, step, watched.step_us, towards, away, user, shown, eye.chance):
+            counts[u][1] += 1
+            identity = errors.taken_for(u, step, away, patience)
+            dx, dy, heading, posture = errors.perceived(u, step, away, user)
+            yield u, identity, user.x + dx, user.y + dy, heading, posture, *truth
+    for ghost in errors.ghosts(watched.walls, eye, at, towards, step) if errors else ():
+        seems = (ghost.x, ghost.y, ghost.heading, 0)
+        yield -1, ghost.identity, *seems, *seems
+
+
+def _shown_points(watched, c, eye, at, towards, u, j):
+    """Yield of each point of a user whether it is in view, and nothing hides it."""
+    robot, user, heights = watched.robot[j], watched.users[u][j], watched.heights
+    from_height = to_height = 0
+    for number, (dx, dy) in enumerate(body_points(eye, watched.radius)):
+        point = user.x + dx, user.y + dy
+        if watched.method is not None:
+            in_view = watched.method(c, u, j) >> number & 1 == 1
+        else:
+            in_view = _in_view(watched.walls, eye, at, towards, point)
+        if heights is not None:
+            from_height = heights.base(robot) + heights.eyes[c][robot.posture]
+            to_height = heights.base(user) + heights.points[c][u][user.posture][number]
+        line = at, point, from_height, to_height
+        yield in_view and not (
+            (heights is not None and any(_piece_hides(piece, *line) for piece in heights.furniture))
+            or any(
+                _body_hides(obstacle, obstacle.poses[j], heights, *line)
+                for n, obstacle in watched.obstacles.items()
+                if n != u and not obstacle.poses[j].away
+            )
+        )
+
+
+def _in_view(walls, eye, at, towards, point):
+    """Return whether a point is in range, in the wedge, and behind no wall."""
+    dx, dy = point[0] - at.x, point[1] - at.y
+    return (
+        _in_range(eye, dx, dy)
+        and in_wedge(towards, eye.half_angle, dx, dy)
+        and bool(visible(walls, np.array(at[:2]), np.array([point]))[0])
+    )
 
 
 def _in_range(eye, dx, dy):
@@ -432,58 +400,28 @@ def hides(point, centre, radius):
     return 0 < part < 1 and away <= radius**2
 
 
-def _lines(heights, c, u, in_view, owner, user):
-    """Return the heights of both ends of the lines to the points of a user in view."""
-    if heights is None:
-        return dict.fromkeys(in_view, (0, 0))
-    return {i: heights.line(c, u, i, owner, user) for i in in_view}
-
-
-def _count_shown(
-    at,
-    user,
-    points,
-    lines,
-    between,
-    j,
-    heights,
-):
-    """Return how many points of a user no body that is at home hides from a camera, and no piece.
-
-    `lines` has the heights of both ends of the line to each point in view.
-    """
-    bodies = {n: body for n, body in between.items() if not body.poses[j].away}
-
-    def is_hidden(number, eye, to):
-        x, y = user.x + points[number][0], user.y + points[number][1]
-        if heights is not None and _furniture_hides(heights, at, (x, y), eye, to):
-            return True
-        px, py = x - at.x, y - at.y
-        for n, obstacle in bodies.items():
-            body = obstacle.poses[j]
-            bx, by = body.x - at.x, body.y - at.y
-            if not hides((px, py), (bx, by), obstacle.radius):
-                continue
-            if heights is None:
-                return True
-            part = Fraction(px * bx + py * by, px * px + py * py)
-            top = heights.tops[n][body.posture] + heights.base(body)
-            if line_is_low(Fraction(eye), Fraction(to), part, top):
-                return True
+def _body_hides(obstacle, body, heights, at, point, from_height, to_height):
+    """Return whether a line from a camera to a point meets a body, and is not above it there."""
+    (px, py), (bx, by) = ((x - at.x, y - at.y) for x, y in (point, body[:2]))
+    if not hides((px, py), (bx, by), obstacle.radius):
         return False
+    part = Fraction(px * bx + py * by, px * px + py * py)
+    top = 0 if heights is None else obstacle.tops[body.posture] + heights.base(body)
+    return from_height + part * (to_height - from_height) <= top
 
-    return sum(not is_hidden(number, *line) for number, line in lines.items())
 
-
-def _points_in_view(walls, eye, at, heading, user, points):
-    """Return which points of a body are in range, in the wedge, and behind no wall."""
-    in_view = set()
-    for number, (px, py) in enumerate(points):
-        dx, dy = user.x + px - at.x, user.y + py - at.y
-        if (
-            _in_range(eye, dx, dy)
-            and in_wedge(heading, eye.half_angle, dx, dy)
-            and visible(walls, np.array([at.x, at.y]), np.array([[at.x + dx, at.y + dy]]))[0]
-        ):
-            in_view.add(number)
-    return in_view
+def _piece_hides(piece, at, point, from_height, to_height):
+    """Return whether the line meets an edge of a piece, and is not above it there."""
+    px, py = point[0] - at.x, point[1] - at.y
+    corners = [(x - at.x, y - at.y) for x, y in piece.corners]
+    for (ax, ay), (bx, by) in pairwise([*corners, corners[0]]):
+        across, parts = px * (by - ay) - py * (bx - ax), []
+        if across != 0:
+            if 0 <= Fraction(ax * py - ay * px, across) <= 1:
+                parts = [Fraction(ax * (by - ay) - ay * (bx - ax), across)]
+        elif px * ay == py * ax and (px, py) != (0, 0):  # along the line
+            parts = [Fraction(px * x + py * y, px**2 + py**2) for x, y in ((ax, ay), (bx, by))]
+        heights = [from_height + p * (to_height - from_height) for p in parts if 0 <= p <= 1]
+        if min(heights, default=math.inf) <= piece.top:
+            return True
+    return False

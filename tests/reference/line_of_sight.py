@@ -17,18 +17,8 @@ def cross(ax, ay, bx, by):
 
 
 def segments_touch(p, q, a, b):
-    """Return whether the closed segments pq and ab share a point; plain Python integers."""
-    side_a = cross(q[0] - p[0], q[1] - p[1], a[0] - p[0], a[1] - p[1])
-    side_b = cross(q[0] - p[0], q[1] - p[1], b[0] - p[0], b[1] - p[1])
-    side_p = cross(b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1])
-    side_q = cross(b[0] - a[0], b[1] - a[1], q[0] - a[0], q[1] - a[1])
-    if side_a * side_b > 0 or side_p * side_q > 0:
-        return False
-    overlap = [
-        max(min(p[i], q[i]), min(a[i], b[i])) <= min(max(p[i], q[i]), max(a[i], b[i]))
-        for i in (0, 1)
-    ]
-    return all(overlap)
+    """Return whether the closed segments pq and ab share a point."""
+    return bool(touches_any_wall(np.array([[*a, *b]]), p, np.array([q]))[0])
 
 
 def is_inside(walls, points):
@@ -66,11 +56,6 @@ def visible(walls, eye, points):
     if not is_inside(walls, eye[None])[0]:
         return np.zeros(len(points), bool)
     return is_inside(walls, points) & ~touches_any_wall(walls, eye, points)
-
-
-def visible_exactly(walls, eye, point):
-    """Return the same for one point that lies inside, in plain Python integers."""
-    return not any(segments_touch(eye, point, (w[0], w[1]), (w[2], w[3])) for w in walls)
 
 
 def on_any_wall(walls, points):
