@@ -6,7 +6,6 @@ import pickle
 import sys
 from bisect import bisect_right
 from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
 
 import numpy as np
 import pytest
@@ -27,6 +26,7 @@ STEP_US = 1000
 HORIZON = 60
 POSE_TYPES = (np.int64, np.int64, np.int64, np.uint8, np.int8)
 ROOM = home_of([shapely.box(0, 0, 1280, 960).difference(shapely.box(500, 300, 640, 700))])
+RULE = WalkRule(np.uint64(5), 9000, 40_000, 500)
 INSIDE = home_of([shapely.box(100, 100, 1180, 860).difference(shapely.box(400, 200, 740, 800))])
 
 
@@ -37,23 +37,14 @@ class Twin:
         self.poses = {}
 
     def follow(self, step, track, posture_us, postures):
-        self._go_on(
-            step,
-            lambda s: (
-                *slow.pose_at(track, s * STEP_US),
-                postures[bisect_right(posture_us, s * STEP_US)],
-            ),
-        )
+        for s in range(step, HORIZON):
+            posture = postures[bisect_right(posture_us, s * STEP_US)]
+            self.poses[s] = *slow.pose_at(track, s * STEP_US), posture
 
     def walk(self, step, walls, space, rule, start):
-        key, stride, sway, limit = (int(part) for part in rule[:4])
-        steps = slow.walk(walls.walls, space.walls, key, stride, sway, limit, start, step)
-        poses = dict(enumerate(islice(steps, HORIZON - step), step))
-        self._go_on(step, lambda s: (*poses[s], 0, 0))
-
-    def _go_on(self, step, pose_at):
-        for s in range(step, HORIZON):
-            self.poses[s] = pose_at(s)
+        poses = slow.walk(walls.walls, space.walls, *map(int, rule[:4]), start, step)
+        for s, pose in zip(range(step, HORIZON), poses, strict=False):
+            self.poses[s] = *pose, 0, 0
 
 
 def breakpoints(track):
@@ -226,7 +217,8 @@ def test_a_window_of_given_poses_joins_equal_ones(data, bodies, steps, first):
     given_poses = (column.astype(t) for column, t in zip(columns, POSE_TYPES, strict=True))
     window = Window(first, *given_poses)
 
-    check_window(window, poses, first, first + steps)
+    for same in (window, copy.deepcopy(window), pickle.loads(pickle.dumps(window))):
+        check_window(same, poses, first, first + steps)
     if bodies and steps:
         begin = data.draw(st.integers(0, steps - 1))
         end = data.draw(st.integers(begin, steps))
@@ -248,51 +240,28 @@ def test_resting_for_ten_years_is_one_run():
     assert [5, 5, 5] == window.x.tolist()
 
 
-def test_a_window_of_no_steps_has_no_runs():
-    window = resting(2).window(7, 7)
-    assert [0, 0, 0] == window.start.tolist()
-    assert [] == dense(window, 1, 7, 7)
+def test_arrays_of_a_window_are_read_only_and_outlive_it():
+    for name in ("start", "step", "x", "y", "heading", "away", "posture"):
+        array = getattr(resting(500).window(3, 9), name)
+        before = array.tolist()
+        gc.collect()
+        assert before == array.tolist()
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
 
 
-def test_a_window_of_nobody_has_no_runs():
-    window = Timelines(0, STEP_US).window(3, 9)
-    assert (3, 9, [0]) == (window.first, window.end, window.start.tolist())
-
-
-@pytest.mark.parametrize("name", ["start", "step", "x", "y", "heading", "away", "posture"])
-def test_arrays_of_a_window_are_read_only_and_outlive_it(name):
-    array = getattr(resting(500).window(3, 9), name)
-    before = array.tolist()
-    gc.collect()
-    assert before == array.tolist()
-    with pytest.raises(ValueError, match="read-only"):
-        array[0] = 1
-
-
-def test_a_walk_is_drawn_once_and_the_same_in_any_order():
-    rule_ = WalkRule(np.uint64(5), 9000, 40_000, 500)
-    ways = []
-    for order in ([50, 0, 20], [0, 20, 50]):
-        timelines = Timelines(1, STEP_US)
-        timelines.walk(0, 0, ROOM.mesh, INSIDE.mesh, rule_, (221, 333, 77))
-        for step in order:
-            timelines.pose(0, step)
-        ways.append(dense(timelines.window(0, 60), 0, 0, 60))
-    assert ways[0] == ways[1]
-    assert len(set(ways[0])) > 20
+def walking(mesh=ROOM.mesh, space=INSIDE.mesh):
+    """Return somebody who walks."""
+    timelines = Timelines(1, STEP_US)
+    timelines.walk(0, 0, mesh, space, RULE, (221, 333, 77))
+    return timelines
 
 
 def test_threads_may_ask_for_the_same_walk_at_once():
     """It is drawn on as it is asked for: two threads that did that at once crashed."""
-    walker = WalkRule(np.uint64(5), 9000, 40_000, 500)
 
     def ask(timelines):
         return [len(timelines.window(s, s + 3000).step) for s in range(0, 60_000, 977)]
-
-    def walking():
-        timelines = Timelines(1, STEP_US)
-        timelines.walk(0, 0, ROOM.mesh, INSIDE.mesh, walker, (221, 333, 77))
-        return timelines
 
     expected = ask(walking())
     for _ in range(10):
@@ -301,10 +270,8 @@ def test_threads_may_ask_for_the_same_walk_at_once():
 
 
 def test_timelines_keep_the_meshes_of_walks_alive():
-    timelines = Timelines(1, STEP_US)
     mesh = home_of([shapely.box(0, 0, 1280, 960)]).mesh
-    rule_ = WalkRule(np.uint64(5), 9000, 40_000, 500)
-    timelines.walk(0, 0, mesh, mesh, rule_, (221, 333, 77))
+    timelines = walking(mesh, mesh)
     expected = timelines.pose(0, 40)
     again = copy.deepcopy(timelines)
     del mesh, timelines
@@ -315,16 +282,16 @@ def test_timelines_keep_the_meshes_of_walks_alive():
 
 def test_meshes_are_freed_with_their_walks():
     """Doors that open and shut make many of them in a month."""
-    timelines, rule_ = resting(2), WalkRule(np.uint64(5), 9000, 40_000, 500)
+    timelines = resting(2)
     meshes = [home_of([shapely.box(0, 0, 1280, 900 + 2 * i)]).mesh for i in range(4)]
 
     def reference_counts():
         return [sys.getrefcount(mesh) for mesh in meshes]
 
     free = reference_counts()
-    timelines.walk(0, 0, meshes[0], meshes[1], rule_, (221, 333, 77))
-    timelines.walk(1, 5, meshes[0], meshes[0], rule_, (221, 333, 77))
-    timelines.walk(0, 10, meshes[2], meshes[3], rule_, (221, 333, 77))
+    timelines.walk(0, 0, meshes[0], meshes[1], RULE, (221, 333, 77))
+    timelines.walk(1, 5, meshes[0], meshes[0], RULE, (221, 333, 77))
+    timelines.walk(0, 10, meshes[2], meshes[3], RULE, (221, 333, 77))
     timelines.pose(0, 30)
     for before, used in ((9, [1, 1, 1, 1]), (10, [1, 0, 1, 1]), (50, [1, 0, 1, 1])):
         timelines.forget(before)
@@ -353,82 +320,64 @@ def test_a_body_without_a_motion_yet_is_nowhere():
 
 @pytest.mark.parametrize("walks", [False, True])
 def test_forgotten_steps_are_refused(walks):
-    timelines = resting()
-    (walk() if walks else follow(step=4))(timelines)
+    timelines, track = walking() if walks else resting(), breakpoints([(0, 5, 6, 7, 0)])
     timelines.pose(0, 30)
-    follow(step=20)(timelines)
+    for step in (20,) if walks else (4, 20):
+        timelines.follow(0, step, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
     timelines.forget(12)
     assert timelines.pose(0, 12)
-    for step in (0, 3 if not walks else 11):
-        with pytest.raises(ValueError, match="forgotten"):
-            timelines.pose(0, step)
-        with pytest.raises(ValueError, match="forgotten"):
-            timelines.window(step, 15)
+    for step in (0, 11 if walks else 3):
+        for ask in (timelines.pose, lambda _, step: timelines.window(step, 15)):
+            with pytest.raises(ValueError, match="forgotten"):
+                ask(0, step)
 
 
-@pytest.mark.parametrize("bodies", [0, 1, 3])
-@pytest.mark.parametrize("steps", [0, 1, 9])
-def test_a_pickled_window_is_restored(bodies, steps):
-    rng = np.random.default_rng(steps)
-    columns = (rng.integers(0, 2, (bodies, steps)).astype(t) for t in POSE_TYPES)
-    window = Window(7, *columns)
-    for again in (copy.deepcopy(window), pickle.loads(pickle.dumps(window))):
-        assert (7, 7 + steps) == (again.first, again.end)
-        for body in range(bodies):
-            assert runs_of(window, body) == runs_of(again, body)
+def restored(kind, state):
+    """Return a window or timelines with a state."""
+    result = kind.__new__(kind)
+    result.__setstate__(state)
+    return result
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("part", "value"),
     [
-        ({"end": 6}, "no state of a window"),
-        ({"first": 8}, "no state of a window"),
-        ({"start": [0, 2, 3]}, "no state of a window"),
-        ({"start": [0, 3, 2]}, "no state of a window"),
-        ({"start": [0, 9, 4]}, "no state of a window"),
-        ({"start": [1, 2, 4]}, "no state of a window"),
-        ({"start": [0, 0, 4]}, "no state of a window"),
-        ({"start": []}, "no state of a window"),
-        ({"step": [7, 8, 7, 11]}, "no state of a window"),
-        ({"step": [7, 7, 7, 8]}, "no state of a window"),
-        ({"step": [8, 9, 7, 8]}, "no state of a window"),
-        ({"x": [0, 1, 2]}, "no state of a window"),
+        (0, 8),
+        (1, 6),
+        (2, [0, 2, 3]),
+        (2, [0, 3, 2]),
+        (2, [0, 9, 4]),
+        (2, [1, 2, 4]),
+        (2, [0, 0, 4]),
+        (2, []),
+        (3, [7, 8, 7, 11]),
+        (3, [7, 7, 7, 8]),
+        (3, [8, 9, 7, 8]),
+        (4, [0, 1, 2]),
     ],
 )
-def test_states_that_no_window_has_are_refused(changes, message):
-    state = {
-        "first": 7, "end": 11, "start": [0, 2, 4], "step": [7, 8, 7, 8],
-        **{name: [0, 1, 2, 3] for name in ("x", "y", "heading", "away", "posture")},
-    }  # fmt: skip
-    types = [int, int, np.int64, np.int64, *POSE_TYPES]
+def test_states_that_no_window_has_are_refused(part, value):
+    state = [7, 11, [0, 2, 4], [7, 8, 7, 8], *[[0, 1, 2, 3]] * 5]
 
-    def read(parts):
-        window = Window.__new__(Window)
-        values = (
-            v if t is int else np.array(v, t) for v, t in zip(parts.values(), types, strict=True)
-        )
-        window.__setstate__(tuple(values))
-        return window
+    def read():
+        types = [np.int64, np.int64, *POSE_TYPES]
+        arrays = (np.array(each, of) for each, of in zip(state[2:], types, strict=True))
+        return restored(Window, (*state[:2], *arrays))
 
-    assert [(7, (2, 2, 2, 2, 2)), (8, (3, 3, 3, 3, 3))] == runs_of(read(state), 1)
-    with pytest.raises(ValueError, match=message):
-        read({**state, **changes})
+    assert [(7, (2, 2, 2, 2, 2)), (8, (3, 3, 3, 3, 3))] == runs_of(read(), 1)
+    state[part] = value
+    with pytest.raises(ValueError, match="no state of a window"):
+        read()
 
 
 def test_states_that_no_timelines_have_are_refused():
-    timelines = resting()
-    bodies, step_us, pieces = timelines.__getstate__()
-    for wrong in (
-        (bodies, 0, pieces),
-        (-1, step_us, pieces),
-        (bodies, step_us, []),
-        (bodies, step_us, [[(0, TRACK, np.zeros(3, np.int64), np.zeros(1, np.int8))]]),
-        (bodies, step_us, [[(0, TRACK)]]),
-        (bodies, step_us, [[(0,) * 8]]),
-        (bodies, step_us, "pieces"),
-        (bodies,),
-        (),
-    ):
-        empty = Timelines.__new__(Timelines)
+    bodies, step_us, pieces = resting().__getstate__()
+    assert (5, 6, 7, 0) == restored(Timelines, (bodies, step_us, pieces)).pose(0, 9)
+    ((piece,),) = pieces
+    too_few = *piece[:2], np.zeros(3, np.int64), *piece[3:]
+    for wrong in ([], [[too_few]], [[piece[:2]]], [[(0,) * 8]], "pieces"):
         with pytest.raises((ValueError, TypeError, RuntimeError, IndexError)):
-            empty.__setstate__(wrong)
+            restored(Timelines, (bodies, step_us, wrong))
+    for wrong in ((bodies, 0, pieces), (-1, step_us, pieces), (bodies,), ()):
+        with pytest.raises((ValueError, TypeError, RuntimeError, IndexError)):
+            restored(Timelines, wrong)
