@@ -21,7 +21,7 @@ VECTOR = st.tuples(st.integers(-9000, 9000), st.integers(-9000, 9000))
 
 def table_of(**perception):
     """Return the table of one camera that sees as far as 10 m."""
-    lens = Camera(range=(0.0, 10.0)).lens(1280, 10**6)
+    lens = Camera(range=(0.0, 10.0), body_points=3).lens(1280, 10**6)
     return error_tables([lens], [Perception.model_validate(perception)], scene()).table
 
 
@@ -64,13 +64,14 @@ def test_opposite_headings_differ_by_half_a_turn(vector):
 CURVES = {
     "distance": [[0, 1], [8, 0.5]], "bearing": [[-180, 0.5], [180, 1]],
     "orientation": [[0, 1], [180, 0.5]], "posture": {"sit": 0.8, "lie": 0.3},
+    "visible_share": [[0, 0.2], [1, 1]],
 }  # fmt: skip
 BY_ALL = table_of(detection=CURVES)
 
 
 @quick
-@given(VECTOR, st.integers(0, 4095), st.integers(0, 4095), st.integers(0, 2))
-def test_steady_chance_is_the_product_of_its_factors(vector, heading, faces, posture):
+@given(VECTOR, st.integers(0, 4095), st.integers(0, 4095), st.integers(0, 2), st.integers(1, 4))
+def test_steady_chance_is_the_product_of_its_factors(vector, heading, faces, posture, shown):
     dx, dy = vector
     metres = math.hypot(dx, dy) / 1280
     towards = math.degrees(math.atan2(dy, dx))
@@ -81,8 +82,9 @@ def test_steady_chance_is_the_product_of_its_factors(vector, heading, faces, pos
         * np.interp(bearing, [-180, 180], [0.5, 1])
         * np.interp(away, [0, 180], [1, 0.5])
         * (1, 0.8, 0.3)[posture]
+        * (0.2 + 0.8 * shown / 4)
     )
-    chance = _core.steady_chance(BY_ALL, 0, heading, dx, dy, faces, posture, 1)
+    chance = _core.steady_chance(BY_ALL, 0, heading, dx, dy, faces, posture, shown)
     if abs(bearing) < 179.8:  # else the sides of the seam differ
         assert expected == pytest.approx(chance / k.ONE, abs=3e-3)
 
