@@ -60,14 +60,6 @@ def test_the_stub_equals_the_output_of_nanobind():
     )
 
 
-def test_the_core_has_functions_classes_and_constants():
-    assert {"detect", "record_coverage", "locate", "visible_region"} <= FUNCTIONS
-    assert {"Mesh", "Routes", "Window", "Timelines", "UserDraw"} <= CLASSES
-    assert all(
-        isinstance(PUBLIC[n], int | float | np.ndarray) for n in {*PUBLIC} - FUNCTIONS - CLASSES
-    )
-
-
 def parts(name):
     """Yield a public name of the core, and if it is a class its own public members."""
     yield name, PUBLIC[name]
@@ -86,26 +78,6 @@ def test_every_name_has_a_docstring(name):
             text.partition("\n\n")[2] if type(value).__name__ in ("nb_func", "nb_method") else text
         )
         assert described[:1].isalnum(), part
-
-
-def imported(path):
-    """Return the modules that a module imports anywhere in it, in full."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return names
-
-
-@pytest.mark.slow
-def test_the_core_is_imported_by_kernels_only_and_numba_by_nobody():
-    for path in SOURCES:
-        names = imported(path)
-        assert not {name for name in names if name.partition(".")[0] == "numba"}, path
-        if path != PACKAGE / "kernels.py":
-            assert "fleet2d._core" not in names, path
 
 
 # What the core exports for its tests alone: the parts of which what others import consists.
@@ -146,19 +118,19 @@ PARTS = [
 
 
 @pytest.mark.slow
-def test_the_core_exports_only_what_others_import_and_the_parts_that_are_tested():
-    imported = set(PARTS)
-    for path in PACKAGE.rglob("*.py"):
+def test_the_core_is_imported_by_kernels_only_and_exports_only_what_is_used():
+    used = set(PARTS)
+    for path in SOURCES:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module in (
-                "fleet2d._core",
-                "fleet2d.kernels",
-            ):
-                imported |= {alias.name for alias in node.names}
+            if isinstance(node, ast.ImportFrom):
+                names = {alias.name for alias in node.names}
+                of_core = node.module == "fleet2d._core" or "_core" in names
+                assert path.name == "kernels.py" or not of_core, path
+                used |= names if node.module in ("fleet2d._core", "fleet2d.kernels") else set()
             elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == "kernels":
-                imported.add(node.attr)
+                used.add(node.attr)
 
-    assert set() == {name for name in vars(_core) if not name.startswith("_")} - imported
+    assert set() == PUBLIC.keys() - used
 
 
 # Structs of the core with other names than their named tuples.

@@ -1,7 +1,5 @@
 """Plans built leg by leg, against the same in lists."""
 
-import copy
-import pickle
 from math import ceil
 
 import numpy as np
@@ -117,13 +115,3 @@ def test_if_a_stop_is_out_of_reach_nothing_is_visited():
 
     assert legs.visit(0, 100, 200, 7, routes, in_pillar, SPEED, TURN_RATE, TURN, 0) is None
     assert not len(legs)
-
-
-def test_copies_go_on_by_themselves():
-    legs = Legs()
-    legs.mark(1, 2, 3, 4, 0)
-    twins = [copy.deepcopy(legs), pickle.loads(pickle.dumps(legs))]
-    legs.mark(2, 2, 3, 4, 0)
-
-    assert [1, 1, 2] == [len(each) for each in (*twins, legs)]
-    assert [[1, 2, 3, 4, 0]] == twins[1].rows().tolist()

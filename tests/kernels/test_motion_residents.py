@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.kernels.calls import CALLS, OneRoom
 from tests.reference.residents import SlowHome
 from tests.scenes import scenario
 from tests.thorough import examples
@@ -87,43 +88,7 @@ def test_activities_equal_those_done_leg_by_leg(data, who):
             assert other[0][name] == one[0][name], name
 
 
-WAITS = Waits(np.array([5, 9]))
-LAW = ([1, 5], 1, 5, 0, 1 << 24)
-VENUE = (None, 0, False, 0, 0, [0], [], [1], [(1, WAITS)], LAW)
-
-
-class Room:
-    """A home of one room, and a seat."""
-
-    def __init__(self, **answers):
-        self.answers = {
-            "spots": [(5, 5)], "seats": [0], "seat": (9, 9, 0, 1, 8, 8), "nearest": 0,
-            "room_at": 0, "wait": 0, "way_out": (1, 1),
-        } | answers  # fmt: skip
-
-    def __getattr__(self, name):
-        return lambda *_: self.answers[name]
-
-
-def live(home=None, scene=None, **changes):
-    """Do an activity where no route is known."""
-    stint = {"number": 0, "end": 1000, "role": 0, "stays": False} | changes
-    now = changes.get("now", (0, 0, 0, 0, 0))
-    walk = changes.get("walk", lambda course, place: ((course[0][0] + 7, *place[1:], 0, 0), 0))
-    resident = Resident(1, 100.0, 100.0, None, [])
-    row = (scene or CoreVenue(*VENUE), *(stint[n] for n in ("number", "end", "role", "stays")))
-    last = changes.get("last", LastStint())
-    return resident.live(
-        home or Room(), walk, Legs(), now, changes.get("posture", 0), [row], 1000, False, last
-    )
-
-
-def test_what_is_asked_for_is_used():
-    end, posture, postures, notes = live()
-    assert ((1000, 5, 5, 0, 0), 0, [], [(7, 0, 0)]) == (end, posture, postures, notes)
-
-
-class Rooms(Room):
+class Rooms(OneRoom):
     """A home of rooms with a spot each."""
 
     def spots(self, room):
@@ -142,14 +107,6 @@ def walks_of(stints, **answers):
     now = (0, 0, 0, 0, 0)
     resident.live(Rooms(**answers), walk, Legs(), now, 0, stints, until, False, LastStint())
     return spots
-
-
-def test_who_was_interrupted_returns_to_where_the_planned_activity_was_done():
-    scenes = [CoreVenue(None, 0, False, 0, 0, [room], [], [], [], None) for room in range(3)]
-    planned, interrupts, resumes = 0, 1, 2
-    rows = [(scenes[0], 0, 100, planned), (scenes[1], 1, 200, interrupts)]
-    rows += [(scenes[2], 2, 300, resumes)]
-    assert [(5, 5), (6, 5), (5, 5)] == walks_of([(*row, False) for row in rows])
 
 
 EVERY_10_S = Waits(np.array([10 * SECOND_US] * 2))
@@ -176,16 +133,15 @@ def test_nothing_is_fetched_without_time_to_wait_and_return(wait_us, more_us, wa
 
 
 def test_an_error_of_the_home_is_passed_on_and_the_last_stint_stays_known():
-    last = LastStint()
-    live(last=last)
-    before = last.__getstate__()
+    *args, last = CALLS["Resident.live"]()
+    args[0] = Resident(1, 100.0, 100.0, None, [])
 
     def no_way(*_):
         raise KeyError("no way")
 
+    args[0].live(*args[1:], last)
+    assert (0, (-1, 1000, 500), (-1, 1000, 500)) == last.__getstate__()
     with pytest.raises(KeyError, match="no way"):
-        live(last=last, walk=no_way, number=1)
+        args[0].live(args[1], no_way, *args[3:], last)
 
-    assert (0, (-1, 5, 5), (-1, 5, 5)) == before
     assert (0, None, None) == last.__getstate__()
-    assert live(last=last)[0] == (1000, 5, 5, 0, 0)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from tests.reference import detections as slow
-from tests.sight.watching import HALL, PILLAR, SIDE_M, UNITS_PER_M, hall, scene
+from tests.sight.watching import SIDE_M, UNITS_PER_M, scene
 from tests.strategies import quick
 
-from fleet2d._core import camera_pose, hides, in_wedge, near_wedge, points_in_view
+from fleet2d._core import camera_pose, hides, in_wedge, near_wedge
 from fleet2d.kernels import camera_poses
 from fleet2d.sight.camera import Camera, stack_lenses
 
@@ -36,15 +36,6 @@ def test_a_camera_turns_with_its_body(heading, forward, left, mount):
     assert (heading + round(mount / 360 * 4096)) % 4096 == towards
 
 
-@pytest.mark.parametrize(
-    ("seconds", "degrees"), [(0, -45), (4.999, -45), (5, 0), (10, 45), (15, 0), (20, -45)]
-)
-def test_a_panning_camera_looks_along_its_current_heading(seconds, degrees):
-    stacked = lenses(pan={"headings_deg": [-45, 0, 45, 0], "dwell": "5 s"})
-    _, _, towards = camera_pose(stacked, 0, 0, 0, 1024, round(seconds * 1e6))
-    assert 1024 + degrees * 4096 // 360 == pytest.approx(towards, abs=1)
-
-
 @pytest.mark.parametrize("pan", [None, {"headings_deg": [-45, 0, 100], "dwell": "7 s"}])
 def test_poses_of_a_camera_at_many_moments_are_those_at_each(pan):
     stacked = lenses(offset=[0.3, -0.2], heading_deg=77, pan=pan)
@@ -57,14 +48,6 @@ def test_poses_of_a_camera_at_many_moments_are_those_at_each(pan):
 
 
 @quick
-@given(st.integers(0, 4095), st.integers(1, 4096), OFFSET, OFFSET)
-def test_points_in_a_wedge_are_within_its_angle(heading, half, dx, dy):
-    off = abs((math.atan2(dy, dx) * 4096 / math.pi - 2 * heading + 4096) % 8192 - 4096)
-    if (dx, dy) != (0, 0) and abs(off - half) > 1e-2:
-        assert (off < half) == in_wedge(heading, half, dx, dy)
-
-
-@quick
 @given(st.integers(0, 4095), st.integers(1, 4096), OFFSET, OFFSET, st.integers(0, 600))
 def test_no_body_that_reaches_into_a_wedge_is_left_out(heading, half, dx, dy, reach):
     """The quick test may be wrong one way only."""
@@ -73,52 +56,6 @@ def test_no_body_that_reaches_into_a_wedge_is_left_out(heading, half, dx, dy, re
     ]
     if any(in_wedge(heading, half, dx + x, dy + y) for x, y in [(0, 0), *rim]):
         assert near_wedge(heading, half, dx, dy, reach + 1)
-
-
-def test_all_points_of_a_body_are_in_view_in_an_empty_hall():
-    stacked = lenses(range=[0, 5], body_points=8)
-    shown = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
-    assert 0b111111111 == shown
-    behind = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, -2 * UNITS_PER_M, 0)
-    assert 0 == behind
-
-
-@pytest.mark.parametrize(("far", "expected"), [(1.81, 1), (2.0, 6), (2.21, 9)])
-def test_points_beyond_the_range_are_not_in_view(far, expected):
-    """A body of 20 cm at 2 m: its nearest point, then half of it, then all."""
-    stacked = lenses(range=[0, far], body_points=8)
-    shown = points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, 2 * UNITS_PER_M, 0)
-    assert expected == pytest.approx(shown.bit_count(), abs=2)
-    assert (far > 2.2) == (shown == 0b111111111)
-
-
-def test_a_pillar_hides_a_body_behind_it():
-    walls, stacked = hall(PILLAR), lenses(range=[0, 9], angle_deg=360, body_points=8)
-    x, y = (round(v * UNITS_PER_M) for v in (3.5, 1.2))
-    assert 0 == points_in_view(walls, stacked, 0, 0, MIDDLE, MIDDLE, 0, x, y)
-    assert 9 == points_in_view(HALL, stacked, 0, 0, MIDDLE, MIDDLE, 0, x, y).bit_count()
-
-
-@pytest.mark.parametrize(
-    ("centre", "expected"),
-    [
-        ((50, 0), True),
-        ((50, 10), True),
-        ((50, -10), True),
-        ((50, 11), False),
-        ((1, 10), True),
-        ((0, 10), False),
-        ((0, 0), False),
-        ((-1, 0), False),
-        ((99, 10), True),
-        ((100, 0), False),
-        ((101, 0), False),
-    ],
-)
-def test_a_body_hides_a_point_whose_line_of_sight_it_touches(centre, expected):
-    """Of radius 10, before a point at (100, 0): one beside the eye or the point hides nothing."""
-    assert expected == hides(100, 0, *centre, 10)
-    assert expected == slow.hides((100, 0), centre, 10)
 
 
 def test_a_body_at_the_very_place_of_the_eye_is_hidden_by_nobody():

@@ -5,7 +5,6 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from shapely.geometry import Polygon
 from tests.meshed_homes import (
     all_homes,
     awkward_points,
@@ -15,15 +14,8 @@ from tests.meshed_homes import (
 from tests.reference.line_of_sight import is_inside, on_any_wall
 from tests.strategies import homes, quick, seeds
 
-from fleet2d._core import BUCKET, contains_triangle, orient
+from fleet2d._core import BUCKET, contains_triangle
 from fleet2d.kernels import locate, rasterize_cells, strictly_inside
-
-
-@pytest.mark.parametrize(
-    ("point", "expected"), [((0, 2), 8), ((9, 0), 0), ((0, -2), -8), ((4, 1), 4)]
-)
-def test_orient_is_the_doubled_signed_area(point, expected):
-    assert expected == orient(0, 0, 4, 0, *point)
 
 
 def lowest_triangle(home, x, y):
@@ -84,16 +76,6 @@ def test_rasterized_cells_are_those_strictly_inside_in_every_mesh(polygons, seed
     assert inside.tolist() == (triangle_of_cell.ravel() >= 0).tolist()
     for (x, y), triangle in zip(grid.tolist(), triangle_of_cell.ravel().tolist(), strict=True):
         assert triangle == (locate(mesh, x, y) if triangle >= 0 else -1)
-
-
-def test_cells_on_a_diagonal_wall_are_not_free():
-    # The diagonal runs exactly through the centres of the cells (k, k), and only through those.
-    home = home_of([Polygon([(0, 0), (1280, 0), (1280, 1280)])])
-
-    free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
-
-    assert not free.diagonal().any()
-    assert free[4, 5]
 
 
 def test_cells_of_every_home_equal_the_free_cells_of_shapely(shared_data):

@@ -23,15 +23,6 @@ def test_moved_walls_equal_the_slow_ones(polygons, reach, part):
             assert expected.tolist() == move_walls(corners, reach, half).tolist()
 
 
-def test_walls_of_a_room_move_inwards_and_those_of_a_pillar_outwards():
-    room = np.array([(0, 0), (50, 0), (100, 0), (100, 80), (0, 80)])
-    inner = [[90, 10], [90, 70], [10, 70], [10, 10]]
-    assert sorted(inner) == sorted(move_walls(room, 10, 4).tolist())
-    assert 8 == len(move_walls(room[::-1].copy(), 10, 4))
-    assert 0 == len(move_walls(room, 40, 16))
-    assert 0 == len(move_walls(np.array([(0, 0), (9, 9), (0, 9)]), 1, 0))
-
-
 WIDTHS = (0, 1, 4, 6)  # of the lines of a grid, whose cells are 1 to 3 wide
 
 

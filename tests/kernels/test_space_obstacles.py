@@ -69,25 +69,6 @@ def test_no_cut_leaves_as_many_pieces_or_fewer(boxes, octagon):
         space = shapely.difference(space, shape)
 
 
-def test_a_board_from_wall_to_wall_cuts_once_and_one_in_a_corner_never():
-    room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
-
-    assert 1 == add_obstacles(room, np.array([[190, 0, 210, 300]]), 20, 8)[1]
-    assert 1 == add_obstacles(room, np.array([[190, 39, 210, 262]]), 20, 8)[1]
-    assert 0 == add_obstacles(room, np.array([[190, 41, 210, 300]]), 20, 8)[1]
-    assert 0 == add_obstacles(room, np.array([[0, 0, 90, 90], [150, 150, 170, 170]]), 20, 8)[1]
-    assert 0 == add_obstacles(room, np.zeros((0, 4), np.int64), 20, 8)[1]
-
-
-def test_two_boxes_that_touch_each_other_and_two_walls_cut_once():
-    room = wall_obstacles(*rings_of([shapely.box(0, 0, 400, 300)]), 20, 8)
-
-    table, cuts = add_obstacles(room, np.array([[190, 0, 210, 140]]), 20, 8)
-    assert 0 == cuts
-    assert 1 == add_obstacles(table, np.array([[190, 150, 210, 300]]), 20, 8)[1]
-    assert 0 == add_obstacles(table, np.array([[190, 190, 210, 300]]), 20, 8)[1]
-
-
 def test_a_box_between_a_slanted_wall_and_another_may_cut():
     """Their octagons don't meet at the slanted wall itself, but may where it is at most."""
     tent = wall_obstacles(*rings_of([Polygon([(0, 0), (400, 0), (400, 300)])]), 20, 8)

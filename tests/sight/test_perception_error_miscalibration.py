@@ -3,12 +3,7 @@
 import numpy as np
 from tests.sight.sightings import sightings
 
-from fleet2d.configuration.components import lookup
 from fleet2d.sight.built_in_errors import Miscalibration
-
-
-def test_it_is_found_by_its_name():
-    assert lookup("perception_error", "miscalibration") is Miscalibration
 
 
 def test_people_are_turned_round_the_camera_and_so_are_their_headings():

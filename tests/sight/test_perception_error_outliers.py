@@ -3,7 +3,6 @@
 import numpy as np
 from tests.sight.sightings import sightings
 
-from fleet2d.configuration.components import lookup
 from fleet2d.sight.built_in_errors import Outliers
 
 MANY = 20_000
@@ -15,10 +14,6 @@ def errors(outliers):
     off = outliers.distort(seen)
     np.testing.assert_array_equal(0, off.y)
     return off.x - 50
-
-
-def test_it_is_found_by_its_name():
-    assert lookup("perception_error", "outliers") is Outliers
 
 
 def test_a_share_is_off_by_bell_shaped_errors():

@@ -6,7 +6,6 @@ from pydantic import ValidationError
 from tests.sight.sightings import sightings
 
 import fleet2d
-from fleet2d.configuration.components import lookup
 from fleet2d.errors import Fleet2DError
 from fleet2d.sight.built_in_errors import TakenFor
 
@@ -18,10 +17,6 @@ def taken(user, **fields):
     who = np.full(MANY, user)
     seen = sightings(np.full(MANY, 2.0), np.zeros(MANY), user=who, true_user=who)
     return TakenFor.model_validate(fields).distort(seen).user
-
-
-def test_it_is_found_by_its_name():
-    assert lookup("perception_error", "taken_for") is TakenFor
 
 
 def test_each_user_is_taken_for_others_at_its_own_rate():

@@ -1,6 +1,5 @@
 """A camera that looks at users who are somewhere else in each step: what comes of a perception."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,7 +16,6 @@ from fleet2d.kernels import (
     MAX_GHOSTS,
     DetectionRule,
     Mesh,
-    SightMemory,
     Window,
     detect,
     new_memory,
@@ -62,10 +60,8 @@ class Watch:
     step_s: float = 1.0
     start_h: float = 0.0
     seed: int = 1
-    first: int = 0
     walls: Mesh = HALL
     radius: float = 0.2
-    memory: SightMemory | None = None
 
     def look(self):
         """Return all sightings, a row each."""
@@ -88,8 +84,7 @@ class Watch:
         rule = DetectionRule(
             lens.patience, step_us, round(self.start_h * 3.6e9), burst, False, False
         )
-        if self.memory is None:
-            self.memory = new_memory(1, count, burst * (lens.latency // lens.period + 2))
+        memory = new_memory(1, count, burst * (lens.latency // lens.period + 2))
         robot = (
             np.tile([SIDE_M / 2, SIDE_M / 2, 0.0], (steps, 1)) if self.robot is None else self.robot
         )
@@ -97,10 +92,10 @@ class Watch:
         if self.posture is not None:
             posture[1:] = self.posture
         poses = _lattice(np.concatenate([robot[None], self.users]))
-        window = Window(self.first, *poses, np.zeros((count + 1, steps), np.uint8), posture)
+        window = Window(0, *poses, np.zeros((count + 1, steps), np.uint8), posture)
         lenses = stack_lenses([lens], [True], scene)
         done, step, index, distinct, *_ = detect(
-            self.walls, lenses, errors, rule, window, 0, 1, self.memory
+            self.walls, lenses, errors, rule, window, 0, 1, memory
         )
         assert done == steps
         return SightingTable(step, index, distinct.T).rows()
@@ -129,8 +124,3 @@ def agree(hits, expected, z=4.5):
     assert len(hits) > 100
     spread = np.sqrt((p * (1 - p)).sum())
     return bool(abs(hits.sum() - p.sum()) <= z * spread + 0.5 + 1e-3 * p.sum())
-
-
-def changed(watch, **changes):
-    """Return the same with changes, and nothing remembered."""
-    return dataclasses.replace(watch, memory=None, **changes)
