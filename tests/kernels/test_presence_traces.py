@@ -32,19 +32,14 @@ def evidence_of(random, bins, rooms, first, put_back=0):
 
 
 @pytest.mark.parametrize("put_back", [0, 60, 120])
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(5))
 def test_features_equal_those_of_the_twin(seed, put_back):
     random = np.random.default_rng(seed)
     count = [1, 2, 3, 7, 40][seed % 5]
     home = rooms_of(random, count)
     evidence = evidence_of(random, 150, count, 100 * seed, put_back)
     twin = slow.Traces(count)
-    expected = [
-        twin.add(
-            home, *(int(part[k]) for part in evidence[:2]), *(part[k] for part in evidence[2:])
-        )
-        for k in range(150)
-    ]
+    expected = [twin.add(home, *bin_) for bin_ in zip(*evidence, strict=True)]
 
     features = trace_evidence(np.zeros(trace_size(home)), home, evidence)
 
@@ -65,7 +60,7 @@ def test_features_are_the_same_in_parts():
     assert np.array_equal(memory, whole)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_probabilities_equal_those_of_the_twin(seed):
     random = np.random.default_rng(seed)
     width, hidden, count = 5, [1, 3, 8][seed % 3], [1, 2, 9][seed % 3]

@@ -47,6 +47,8 @@ def robustness(
     match formula:
         case ("is", name):
             return inf if signals[name][step] > 0 else -inf
+        case ("true",):
+            return inf
         case ("above", name, limit):
             return signals[name][step] - limit
         case ("less", one, other):
@@ -58,9 +60,9 @@ def robustness(
         case ("or", one, other):
             return max(of(one, step), of(other, step))
         case ("implies", one, other):
-            return max(-of(one, step, not high), of(other, step))
+            return of(("or", ("not", one), other), step)
         case ("once", part, steps):
-            return max((of(part, t) for t in earlier(steps)), default=-inf)
+            return of(("since", ("true",), part, steps), step)
         case ("since", hold, goal, steps):
             ways = [
                 min([of(goal, t), *(of(hold, u) for u in range(t + 1, step + 1))])
@@ -68,13 +70,9 @@ def robustness(
             ]
             return max(ways, default=-inf)
         case ("always", part, steps):
-            window, unknown = later(steps)
-            beyond = [inf if high else -inf] if unknown else []
-            return min([*(of(part, t) for t in window), *beyond], default=inf)
+            return -of(("eventually", ("not", part), steps), step, not high)
         case ("eventually", part, steps):
-            window, unknown = later(steps)
-            beyond = [inf if high else -inf] if unknown else []
-            return max([*(of(part, t) for t in window), *beyond], default=-inf)
+            return of(("until", ("true",), part, steps), step)
         case ("until", hold, goal, steps):
             window, unknown = later(steps)
             ways = [min([of(goal, t), *(of(hold, u) for u in range(step, t))]) for t in window]

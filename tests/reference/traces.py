@@ -1,107 +1,93 @@
 """Slow twin of the traces of evidence, and of the network over places."""
 
-import math
-
 import numpy as np
 
 CAP = 2880.0
 
 
-def since(time, before):
-    """Return the minutes since an earlier time that count; none where a clock was put back."""
-    return min(max(time - before, 0.0), CAP)
-
-
 class Traces:
-    """What the evidence of one person leaves behind in each room."""
+    """What the evidence of one person leaves behind in each room; times are in minutes."""
 
     def __init__(self, rooms):
         """Begin without evidence."""
-        self.rooms = rooms
-        self.first = None
-        self.last, self.last_time = -1, -1e9
-        self.seen_at, self.looked_at = [-1e9] * rooms, [-1e9] * rooms
-        self.most, self.sum = [0.0] * rooms, [0.0] * rooms
-        self.recent_10, self.recent_60 = [0.0] * rooms, [0.0] * rooms
-        self.seen = [[0.0] * rooms for _ in range(24)]
-        self.watched = [[0.0] * rooms for _ in range(24)]
-        self.moves = [[0.0] * rooms for _ in range(rooms)]
-        self.gone, self.bins = [0] * 24, [0] * 24
+        self.first, self.last, self.last_time = None, -1, -1e9
+        self.seen_at, self.looked_at = np.full((2, rooms), -1e9)
+        self.most, self.sum, self.recent_10, self.recent_60 = np.zeros((4, rooms))
+        self.seen, self.watched = np.zeros((2, 24, rooms))
+        self.moves = np.zeros((rooms, rooms))
+        self.gone, self.bins = np.zeros((2, 24))
 
     def add(self, home, day, minute, watched, seen, unknown, belief):
         """Add a bin; return a row of features for each room, and last for away."""
-        time, hour, rooms = day * 1440.0 + minute, minute // 60, range(self.rooms)
+        time, hour = day * 1440.0 + minute, minute // 60
         self.first = time if self.first is None else self.first
-        if any(share > 0 for share in seen):
-            room = max(rooms, key=lambda r: (seen[r], -r))
+        if seen.any():
+            room = int(np.argmax(seen))
             if self.last >= 0 and (room != self.last or time - self.last_time > 1):
-                self.moves[self.last][room] += 1
+                self.moves[self.last, room] += 1
             self.last, self.last_time = room, time
-            self.most, self.sum = [0.0] * self.rooms, [0.0] * self.rooms
-        empty = [0.0 if seen[r] > 0 else float(watched[r]) for r in rooms]
-        for r in rooms:
-            self.seen_at[r] = time if seen[r] > 0 else self.seen_at[r]
-            self.looked_at[r] = time if watched[r] > 0.5 else self.looked_at[r]
-            self.most[r], self.sum[r] = max(self.most[r], empty[r]), self.sum[r] + empty[r]
-            self.recent_10[r] = self.recent_10[r] * 0.905 + empty[r]
-            self.recent_60[r] = self.recent_60[r] * 0.9835 + empty[r]
-            self.seen[hour][r] += seen[r]
-            self.watched[hour][r] += watched[r]
-        cover = sum(home.share[r] * self.most[r] for r in rooms)
-        gap = since(time, self.last_time)
+            self.most, self.sum = np.zeros((2, len(seen)))
+        empty = np.where(seen > 0, 0, watched)
+        self.seen_at[seen > 0] = time
+        self.looked_at[watched > 0.5] = time
+        self.most = np.maximum(self.most, empty)
+        self.sum += empty
+        self.recent_10 = self.recent_10 * 0.905 + empty
+        self.recent_60 = self.recent_60 * 0.9835 + empty
+        self.seen[hour] += seen
+        self.watched[hour] += watched
+        cover, gap = home.share @ self.most, self._since(time, self.last_time)
         self.gone[hour] += cover > 0.6 and gap > 5
         self.bins[hour] += 1
-        return self._rows(home, hour, time, gap, cover, watched, seen, unknown, belief)
 
-    def _rows(self, home, hour, time, *rest):
-        gap, cover, watched, seen, unknown, belief = rest
-        rooms = range(self.rooms)
-        total = [sum(self.seen[h][r] for h in range(24)) for r in rooms]
-        rate = [(total[r] + 1) / (sum(self.watched[h][r] for h in range(24)) + 10) for r in rooms]
+        total = self.seen.sum(axis=0)
+        rate = (total + 1) / (self.watched.sum(axis=0) + 10)
         hours = [hour, (hour - 1) % 24, (hour + 1) % 24]
-        near = [
-            (sum(self.seen[h][r] for h in hours) + 30 * rate[r])
-            / (sum(self.watched[h][r] for h in hours) + 30)
-            for r in rooms
-        ]
-        moves = [self.moves[self.last][r] + 0.5 for r in rooms] if self.last >= 0 else []
-        shared = [
-            math.log1p(gap),
-            cover,
-            math.log1p((time - self.first) / 1440),
-            float(any(share > 0 for share in seen)),
-            max(self.most),
-            math.log1p(sum(home.share[r] * self.sum[r] for r in rooms)),
-        ]
+        near = self.seen[hours].sum(axis=0) + 30 * rate
+        near = near / (self.watched[hours].sum(axis=0) + 30)
+        moves = np.ones(len(seen))
+        distance = np.zeros(len(seen))
+        if self.last >= 0:
+            moves, distance = self.moves[self.last] + 0.5, home.distance[self.last]
+        is_last = np.arange(len(seen)) == self.last
         own = [
-            [
-                float(r == self.last),
-                math.log1p(gap) if r == self.last else 0.0,
-                math.log1p(since(time, self.seen_at[r])),
-                seen[r],
-                math.log1p(since(time, self.looked_at[r])),
-                self.most[r],
-                math.log1p(self.sum[r]),
-                math.log1p(self.recent_10[r]),
-                math.log1p(self.recent_60[r]),
-                watched[r],
-                math.log(rate[r] / sum(rate)),
-                math.log(near[r] / sum(near)),
-                total[r] / (sum(total) + 1),
-                math.log(moves[r] / sum(moves)) if moves else 0.0,
-                home.distance[self.last][r] if moves else 0.0,
-                float(unknown[r]),
-                0.0,
-                0.0,
-            ]
-            for r in rooms
+            is_last,
+            np.log1p(gap) * is_last,
+            np.log1p(self._since(time, self.seen_at)),
+            seen,
+            np.log1p(self._since(time, self.looked_at)),
+            self.most,
+            np.log1p(self.sum),
+            np.log1p(self.recent_10),
+            np.log1p(self.recent_60),
+            watched,
+            np.log(rate / rate.sum()),
+            np.log(near / near.sum()),
+            total / (total.sum() + 1),
+            np.log(moves / moves.sum()) * (self.last >= 0),
+            distance,
+            unknown,
         ]
-        gone = (self.gone[hour] + 1) / (self.bins[hour] + 4)
-        gone_ever = (sum(self.gone) + 1) / (sum(self.bins) + 4)
-        own.append([0.0] * 16 + [gone, gone_ever])
-        return [
-            [*row, *shared, math.log(max(belief[place], 1e-6))] for place, row in enumerate(own)
+        shared = [
+            np.log1p(gap),
+            cover,
+            np.log1p((time - self.first) / 1440),
+            seen.any(),
+            self.most.max(),
+            np.log1p(home.share @ self.sum),
         ]
+        rows = np.zeros((len(seen) + 1, 25))
+        rows[:-1, :16] = np.transpose(own)
+        rows[-1, 16] = (self.gone[hour] + 1) / (self.bins[hour] + 4)
+        rows[-1, 17] = (self.gone.sum() + 1) / (self.bins.sum() + 4)
+        rows[:, 18:24] = shared
+        rows[:, 24] = np.log(np.maximum(belief, 1e-6))
+        return rows
+
+    @staticmethod
+    def _since(time, before):
+        """Return the minutes since an earlier time that count; none where a clock was put back."""
+        return np.clip(time - before, 0, CAP)
 
 
 def place_probabilities(network, places, features):
