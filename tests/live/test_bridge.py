@@ -70,15 +70,15 @@ def test_ctrl_c_within_a_step_ends_the_run_after_it(monkeypatch):
     assert [0, 1, 2, 3] == [frame.step for frame in peer.frames]
 
 
-def test_poses_are_where_the_body_is():
-    run, peer, bridge = bridged({k: [pose(k, heading_deg=90)] for k in range(10)})
+def test_the_last_pose_of_a_step_is_where_the_body_is():
+    run, peer, bridge = bridged({k: [pose(99), pose(k, heading_deg=90)] for k in range(10)})
 
     x, _ = place()
     assert [round(f.bodies["ana"]["x"] - x, 2) for f in peer.frames[:10]] == [
         round(0.01 * k, 2) for k in range(10)
     ]
     assert peer.frames[-1].bodies["ana"]["x"] == peer.frames[9].bodies["ana"]["x"]
-    assert bridge.counts == {"received": 10, "applied": 10}
+    assert bridge.counts == {"received": 20, "applied": 10, "replaced": 10}
     assert run.status == peer.ended == "complete"
 
 
@@ -90,15 +90,22 @@ def test_a_recorded_live_run_gives_the_same_digest(tmp_path):
         "entity": "astro",
         "detections": [{"user": "ana", "x": x, "y": y}],
     }
+    steer = {"type": "velocity", "entity": "astro", "forward": 0.2, "turn_deg": -20}
     messages: dict[int, list[Any]] = {
         0: [pose(0), seen, {"type": "reading", "sensor": "front_door", "on": True}],
         3: ["nonsense", pose(3), seen],
-        7: [{"type": "goal", "entity": "astro", "to": "kitchen_1"}],
+        7: [{"type": "goal", "entity": "astro", "to": list(place()), "heading_deg": 90}],
+        9: [steer],
+        10: [steer],
+        12: [{"type": "goal", "entity": "astro", "to": "bathroom_1"}],
+        20: [{"type": "cancel", "entity": "astro"}],
     }
 
     run, _, _ = bridged(messages, out=tmp_path / "run")
 
     assert run.tables["observations"].num_rows == 2
+    headings = [act.get("heading_deg") for act in run.manifest["interventions"]]
+    assert 90 in headings
     assert fleet2d.reproduce(tmp_path / "run").digest == run.digest
 
 
@@ -129,11 +136,14 @@ def test_frames_have_every_event_and_row_of_the_run():
     ("message", "told"),
     [
         ("{", "wrong: not JSON"),
-        ("[1]", "wrong: "),
         ({"type": "dance"}, "wrong: "),
         (pose(0) | {"entity": "anna"}, "wrong: there is nobody named 'anna': did you mean 'ana'"),
         (pose(0) | {"x": 1e9}, "wrong: pose.x: "),
-        (pose(0) | {"x": -90.0}, "wrong: "),
+        (pose(0) | {"x": -90.0}, "wrong: ana would be "),
+        (
+            pose(0) | {"x": 9000.0, "y": 4000.0},
+            "wrong: ana would be 9827.4 m from any place where its body fits by its coordinates: in mi",
+        ),
         (pose(0) | {"speed": 3}, "wrong: "),
         ({"type": "reading", "sensor": "door", "on": True}, "wrong: there is no sensor 'door'"),
         (pose(0) | {"time": 5.0}, "late: a message was sent"),
@@ -154,14 +164,6 @@ def test_what_is_wrong_is_told_and_the_body_stands(message, told):
     assert len({frame.bodies["ana"]["x"] for frame in peer.frames}) == 1
 
 
-def test_lost_and_late_messages_are_counted_by_their_numbers():
-    numbers = [0, 1, 4, 3, 5]
-    _, peer, bridge = bridged({k: [pose(k, number=n)] for k, n in enumerate(numbers)})
-
-    assert bridge.counts == {"received": 5, "applied": 4, "lost": 2, "late": 1}
-    assert peer.told == ["lost: 2 messages before number 4", "late: message 3 after 4"]
-
-
 def test_a_pulse_shorter_than_a_step_is_seen():
     """Of on and off in one step a sensor had only the last state, and both were applied."""
     on, off = ({"type": "reading", "sensor": "front_door", "on": state} for state in (True, False))
@@ -173,14 +175,6 @@ def test_a_pulse_shorter_than_a_step_is_seen():
         (row["step"], row["state"]) for row in rows
     ]
     assert bridge.counts == {"received": 7, "applied": 5, "replaced": 2}
-
-
-def test_of_a_flood_only_some_is_applied():
-    flood = [{"type": "reading", "sensor": "front_door", "on": bool(k % 2)} for k in range(5000)]
-    _, peer, bridge = bridged({0: flood}, max_per_step=100)
-
-    assert bridge.counts == {"received": 5000, "applied": 2, "replaced": 98, "too many": 4900}
-    assert peer.told == ["too many: more than 100 messages in a step"]
 
 
 def test_a_flood_does_not_fill_the_memory():
@@ -196,14 +190,6 @@ def test_a_flood_does_not_fill_the_memory():
     rest = [bridge.counts[why] for why in ("applied", "replaced", "too many")]
     assert sum(rest) == 1000
     assert rest[2] >= 900
-
-
-@pytest.mark.slow
-def test_only_the_last_pose_of_a_step_counts():
-    _, peer, bridge = bridged({0: [pose(k) for k in range(50)]})
-
-    assert bridge.counts == {"received": 50, "applied": 1, "replaced": 49}
-    assert peer.frames[0].bodies["ana"]["x"] == pytest.approx(place()[0] + 0.49, abs=1e-3)
 
 
 @pytest.mark.slow
@@ -264,54 +250,32 @@ def test_a_function_may_intervene():
 # Who sends what
 
 
-def by(client: int, messages: dict[int, Any], **options: Any) -> tuple[Any, Now, Bridge]:
-    """Run with messages of a client, None when it disconnects, before some steps."""
-    peer = Now({})
-    peer.messages = {step: [message] for step, message in messages.items()}
-    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=0, **options)
-    own, peer.open = peer.open, lambda simulation, post: own(simulation, lambda m: post(m, client))  # type: ignore[method-assign]
-    return bridge.run(), peer, bridge
-
-
 GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_1"}
 
 
-def test_goals_of_a_client_that_is_gone_are_withdrawn_and_the_body_stands():
-    run, peer, bridge = by(3, {0: GOAL, 5: None})
+@pytest.mark.parametrize(("gone", "options"), [(3, {"keeps_goals": True}), (2, {})])
+def test_goals_stay_if_they_are_to_be_kept_or_another_client_is_gone(gone, options):
+    bridge = Bridge(fleet2d.Simulation(LIVE), [Now({})], speed=0, **options)
+    post = bridge._post_of(0)
+    post(GOAL, 3)
+    post(None, gone)
+
+    assert [act["do"] for act in bridge.run().manifest["interventions"]] == ["send"]
+
+
+@pytest.mark.parametrize("behavior", ["live", "patrol"])
+def test_goals_of_a_client_that_is_gone_are_withdrawn_and_the_body_stands_or_decides(behavior):
+    content = LIVE | {"robots": {"astro": {"behaviors": [{"type": behavior}]}}}
+    peer = Now({0: [GOAL], 5: [None]})
+    bridge = Bridge(fleet2d.Simulation(content), [peer], speed=0)
+    run = bridge.run()
 
     assert [act["do"] for act in run.manifest["interventions"]] == ["send", "release"]
     assert peer.told == ["astro: who sent it to kitchen_1 is gone: the goal is withdrawn"]
     places = [(frame.bodies["astro"]["x"], frame.bodies["astro"]["y"]) for frame in peer.frames]
     assert len(set(places[:5])) > 1
-    assert len(set(places[6:])) == 1
+    assert (len(set(places[6:])) == 1) == (behavior == "live")
     assert bridge.counts["withdrawn"] == 1
-
-
-def test_goals_stay_if_they_are_to_be_kept():
-    run, peer, _ = by(3, {0: GOAL, 5: None}, keeps_goals=True)
-
-    assert [act["do"] for act in run.manifest["interventions"]] == ["send"]
-    assert peer.told == []
-
-
-def test_a_body_that_decides_goes_on_by_itself_after_a_goal_is_withdrawn():
-    content = LIVE | {"robots": {"astro": {"behaviors": [{"type": "patrol"}]}}}
-    peer = Now({0: [GOAL], 5: [None]})
-
-    Bridge(fleet2d.Simulation(content), [peer], speed=0).run()
-
-    places = {(frame.bodies["astro"]["x"], frame.bodies["astro"]["y"]) for frame in peer.frames[6:]}
-    assert len(places) > 1
-
-
-def test_a_goal_of_another_client_is_not_withdrawn():
-    peer = Now({})
-    bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=0)
-    post = bridge._post_of(0)
-    post(GOAL, 1)
-    post(None, 2)
-
-    assert [act["do"] for act in bridge.run().manifest["interventions"]] == ["send"]
 
 
 def test_clients_of_one_peer_count_their_own_messages():
@@ -420,21 +384,6 @@ def test_a_message_that_is_refused_replaces_none(right, wrong):
     assert len(told) == 1
 
 
-def test_a_message_of_another_than_the_source_replaces_none():
-    source, other = Now({3: [GOAL]}), Now({3: [HALLWAY]})
-    peers = {SOURCE: source, "function": other}
-    run = Bridge(fleet2d.Simulation(sourced()), peers, speed=0).run()
-
-    assert [act["to"] for act in run.manifest["interventions"]] == ["kitchen_1"]
-
-
-def test_what_is_refused_is_tried_only_so_often():
-    acts, counts, _ = ordered(GOAL, *[GOAL | {"to": "kitchn_1"}] * 200)
-
-    assert acts == []
-    assert counts == {"received": 201, "wrong": 100, "replaced": 101}
-
-
 def test_a_goal_of_a_client_that_came_back_within_a_step_stays():
     acts, counts, _ = ordered(GOAL, None, HALLWAY)  # type: ignore[arg-type]
     assert acts == [("send", "hallway_1")]
@@ -460,19 +409,6 @@ def test_a_pose_in_a_wall_is_moved_to_where_the_body_fits_and_told():
     assert act["to"][0] == pytest.approx(x, abs=0.05)
     assert bridge.counts["moved"] == 1
     assert re.fullmatch(r"moved: ana: a pose in or at a wall, by 0\.1\d m", peer.told[0])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("off", [(-30.0, 0.0), (0.0, 1e4)])
-def test_a_pose_of_another_frame_is_told_with_its_distance(off):
-    x, y = place()
-    message = {"type": "pose", "entity": "ana", "x": x + off[0], "y": min(y + off[1], 1e4)}
-
-    run, peer, bridge = bridged({0: [message]})
-
-    assert run.manifest["interventions"] == []
-    assert re.match(r"wrong: ana would be \d+\.\d m from any place where its body", peer.told[0])
-    assert bridge.counts["wrong"] == 1
 
 
 def test_detections_outside_of_the_home_are_left_out_and_told():
@@ -534,50 +470,6 @@ def test_a_message_before_the_last_one_of_its_body_is_late(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_pose_in_millimetres_is_told_as_such():
-    x, y = place()
-    _, peer, bridge = bridged({0: [pose(0) | {"x": 1000 * x % 1e4, "y": 1000 * y}]})
-    assert bridge.counts["wrong"] == 1
-
-    _, peer, _ = bridged({0: [pose(0) | {"x": 9000.0, "y": 4000.0}]})
-    assert peer.told[0].endswith("by its coordinates: in millimetres they would")
-
-
-def test_a_body_that_jumps_is_told():
-    x, y = place("bedroom_1")
-    elsewhere = pose(0) | {"x": x, "y": y}
-    _, peer, bridge = bridged({k: [elsewhere if k % 2 else pose(0)] for k in range(4)})
-
-    assert bridge.counts == {"received": 4, "applied": 4, "jumps": 3}
-    assert re.fullmatch(r"jumps: ana: a pose is \d+\.\d m from the one 1 s before", peer.told[0])
-
-
-def test_two_programs_that_send_poses_of_one_body_are_told():
-    first, second = Now({0: [pose(0)]}), Now({1: [pose(1)]})
-    bridge = Bridge(fleet2d.Simulation(LIVE), [first, second], speed=0)
-    bridge.run()
-
-    assert first.told == ["of two senders: ana: poses of two programs arrive: name its source"]
-    assert bridge.counts == {"received": 2, "applied": 2, "of two senders": 1}
-
-
-def test_two_programs_whose_poses_come_within_one_step_are_told():
-    first, second = Now({0: [pose(0)]}), Now({0: [pose(1)]})
-    bridge = Bridge(fleet2d.Simulation(LIVE), [first, second], speed=0)
-    bridge.run()
-
-    assert first.told == ["of two senders: ana: poses of two programs arrive: name its source"]
-    assert bridge.counts["replaced"] == 1
-
-
-def test_a_goal_keeps_its_heading():
-    goal = {"type": "goal", "entity": "astro", "to": list(place()), "heading_deg": 90}
-    run, _, _ = bridged({0: [goal]})
-
-    assert run.manifest["interventions"][0]["heading_deg"] == 90
-
-
-@pytest.mark.slow
 def test_an_iterator_that_fails_is_told_in_a_line(capfd):
     def messages() -> Iterator[dict[str, Any]]:
         yield pose(0)
@@ -591,3 +483,50 @@ def test_an_iterator_that_fails_is_told_in_a_line(capfd):
     assert told[0] == "errors: a thread ended: ValueError: no more"
     assert bridge.counts["errors"] == 1
     assert "Traceback" not in capfd.readouterr().err
+
+
+FLOOD = [{"type": "reading", "sensor": "front_door", "on": bool(k % 2)} for k in range(5000)]
+AFAR = dict(zip("xy", place("bedroom_1"), strict=True))
+COUNTED: dict[str, tuple[dict[int, list[Any]], dict[str, int], list[str]]] = {
+    "lost and late by their numbers": (
+        {k: [pose(k, number=n)] for k, n in enumerate([0, 1, 4, 3, 5])},
+        {"received": 5, "applied": 4, "lost": 2, "late": 1},
+        ["lost: 2 messages before number 4", "late: message 3 after 4"],
+    ),
+    "a flood": (
+        {0: FLOOD},
+        {"received": 5000, "applied": 2, "replaced": 998, "too many": 4000},
+        ["too many: more than 1000 messages in a step"],
+    ),
+    "a body that jumps": (
+        {k: [pose(0) | (AFAR if k % 2 else {})] for k in range(4)},
+        {"received": 4, "applied": 4, "jumps": 3},
+        [r"jumps: ana: a pose is \d+\.\d m from the one 1 s before"],
+    ),
+    "what is refused is tried so often": (
+        {3: [GOAL, *[GOAL | {"to": "kitchn_1"}] * 200]},
+        {"received": 201, "wrong": 100, "replaced": 101},
+        ["wrong: .* did you mean 'kitchen_1'.*"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", COUNTED)
+def test_what_is_odd_is_counted_and_told(case):
+    messages, counts, told = COUNTED[case]
+    _, peer, bridge = bridged(messages)
+
+    assert bridge.counts == counts
+    assert len(peer.told) == len(told)
+    for text, expected in zip(peer.told, told, strict=True):
+        assert re.fullmatch(expected, text)
+
+
+@pytest.mark.parametrize(("step", "second"), [(1, "applied"), (0, "replaced")])
+def test_two_programs_that_send_poses_of_one_body_are_told(step, second):
+    first, other = Now({0: [pose(0)]}), Now({step: [pose(1)]})
+    bridge = Bridge(fleet2d.Simulation(LIVE), [first, other], speed=0)
+    bridge.run()
+
+    assert first.told == ["of two senders: ana: poses of two programs arrive: name its source"]
+    assert bridge.counts[second] == 1 + (second == "applied")

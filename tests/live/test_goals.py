@@ -133,22 +133,6 @@ def test_a_robot_whose_battery_is_empty_is_blocked():
     assert states[-1].detail == "it can't move"
 
 
-def test_goals_and_velocities_repeat_to_the_same_digest(tmp_path):
-    steer = {"type": "velocity", "entity": "astro", "forward": 0.2, "turn_deg": -20}
-    peer = Now(
-        {
-            0: [GOAL],
-            9: [steer],
-            10: [steer],
-            12: [{"type": "goal", "entity": "astro", "to": "bathroom_1"}],
-            20: [{"type": "cancel", "entity": "astro"}],
-        }
-    )
-    run = Bridge(fleet2d.Simulation(LIVE, out=tmp_path / "run"), [peer], speed=0).run()
-
-    assert fleet2d.reproduce(tmp_path / "run").digest == run.digest
-
-
 def test_who_sends_a_datagram_hears_what_becomes_of_its_goal():
     peer = UdpPeer("127.0.0.1", 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:

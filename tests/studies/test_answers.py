@@ -1,15 +1,15 @@
-"""Answers on made-up variants, where the truth is known; and on a robot that hangs out or not."""
+"""Answers on made-up variants, where the truth is known."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import polars as pl
 import pytest
 
-import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.studies.answers import StudyAnswers, holm, judged, variance_ratio
+from fleet2d.studies.answers import StudyAnswers, judged, variance_ratio
 from fleet2d.studies.directory import Meta
 
 COLUMNS = ("method", "robot", "home", "seed")
@@ -57,38 +57,13 @@ def test_a_known_difference_is_found_though_homes_differ_more():
     assert row["high"] - row["low"] < 0.2
     assert "above old" in row["verdict"]
     assert (64, 8, 4) == (row["pairs"], row["n_home"], row["n_seed"])
-
-
-def test_pairs_take_out_what_homes_and_lives_have_in_common():
-    (row,) = compare(variants())
-    assert row["variance_ratio"] > 100
-
-
-def test_within_an_axis_each_of_its_values_has_a_row():
-    rows = compare(variants(), within=("robot",))
-    assert ["patrol", "hangout"] == [row["robot"] for row in rows]
+    assert row["variance_ratio"] > 100  # pairs take out what homes and lives have in common
 
 
 def test_missing_variants_leave_out_their_pairs_only():
     frame = variants().filter(~((pl.col("home") == 0) & (pl.col("method") == "new")))
     (row,) = compare(frame)
     assert (56, 7) == (row["pairs"], row["n_home"])
-
-
-def test_too_few_replicates_are_named_with_how_many_are_needed():
-    (row,) = compare(variants(homes=3, effect=0.05, noise=0.4))
-    assert "too few replicates to tell" in row["verdict"]
-    assert "homes (now 3)" in row["verdict"]
-
-
-def test_one_pair_tells_nothing():
-    (row,) = compare(variants(homes=1, seeds=1), within=("robot",))[:1]
-    assert "one pair only" in row["verdict"]
-
-
-def test_equal_values_are_called_the_same():
-    (row,) = compare(variants(effect=0, noise=0))
-    assert "the same as old in every pair" == row["verdict"]
 
 
 def test_an_axis_that_applies_on_one_side_only_needs_no_partner():
@@ -111,12 +86,6 @@ def test_without_pairs_there_is_no_answer():
         compare(frame)
 
 
-def test_shares_of_the_variance_name_what_matters():
-    table = Answers(variants(effect=0)).shares("score")
-    assert "home" == table["source"][0]
-    assert 1 == pytest.approx(table["share"].sum(), abs=0.05)
-
-
 def test_the_ratio_of_variances_is_that_of_unpaired_to_paired():
     generator = np.random.default_rng(2)
     life = generator.normal(0, 1, 4000)
@@ -124,55 +93,6 @@ def test_the_ratio_of_variances_is_that_of_unpaired_to_paired():
     assert 5.0 == pytest.approx(
         variance_ratio(method_b, method_a), rel=0.1
     )  # 2 × 1.25 / (2 × 0.25)
-
-
-@pytest.mark.slow
-def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path):
-    """The same lives in the same homes; compared with runs whose home and seed are another's."""
-    patrol = {"type": "patrol", "cooldown": "1 h"}
-    hangout = {"type": "hangout", "source": "ltp", "near": "view", "period": "30 min"}
-    study = fleet2d.study(
-        {
-            "base": {
-                "extends": "bundled:paper",
-                "simulation": {"start": "2026-01-05T17:00", "duration": "5 h"},
-            },
-            "axes": {
-                "robot": {
-                    "options": {
-                        "off": {"robots.astro.behaviors": [patrol]},
-                        "on": {"robots.astro.behaviors": [hangout, patrol]},
-                    }
-                },
-                "home": {"synthetic": 3, "settings": {"furnish": True}},
-            },
-            "replicates": 6,
-            "keep": {"metrics": ["sightings.*", "distance.*"]},
-        },
-        tmp_path / "hangout",
-        executor="serial",
-    )
-    (walked,) = study.paired("distance.ana", {"robot": "off"}).to_dicts()
-    # Her life is the same, whatever the robot does.
-    assert (0, math.inf) == (walked["difference"], walked["variance_ratio"])
-    frame = study.variants.sort("home", "seed")
-    for metric in ("sightings.ana", "distance.astro"):
-        (row,) = study.paired(metric, {"robot": "off"}).to_dicts()
-        on, off = (
-            frame.filter(frame["robot"] == name)[metric].to_numpy() for name in ("on", "off")
-        )
-        unpaired = np.concatenate([on - np.roll(off, shift) for shift in range(1, len(on))])
-        assert 18 == row["pairs"] == len(on)
-        assert unpaired.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)
-
-
-def test_p_values_are_corrected_for_the_number_of_comparisons():
-    frame = pl.concat(
-        [variants(effect=0.04), variants(effect=0.03).with_columns(method=pl.lit("newer"))]
-    ).unique(["method", "robot", "home", "seed"], maintain_order=True)
-    first, second = compare(frame)
-    assert first["p_holm"] >= first["p"]
-    assert holm([first["p"], second["p"]]) == [first["p_holm"], second["p_holm"]]
 
 
 def test_an_effect_is_told_in_deviations_and_relative_to_the_reference():
@@ -186,26 +106,18 @@ def test_an_effect_is_told_in_deviations_and_relative_to_the_reference():
     assert row["effect_size"] == pytest.approx(2.0)  # differences 1, 2, 3
 
 
-def test_differences_of_each_home_have_the_mean_of_all():
-    frame = variants()
-    rows = Answers(frame).differences("score", {"method": "old"}, "home")
-    assert ["method", "home", "difference"] == rows.columns
-    assert 8 == len(rows)
-    (row,) = compare(frame)
-    assert row["difference"] == pytest.approx(rows["difference"].mean())
-
-
-def test_differences_of_each_home_within_another_axis_are_of_its_values():
+def test_differences_of_each_home_have_the_mean_of_all_within_another_axis_too():
     frame = variants()
     rows = Answers(frame).differences("score", {"method": "old"}, "home", ["robot"])
     assert ["method", "robot", "home", "difference"] == rows.columns
-    for robot in frame["robot"].unique():
-        some = frame.filter(pl.col("robot") == robot)
-        expected = Answers(some).differences("score", {"method": "old"}, "home")
-        assert expected.equals(rows.filter(pl.col("robot") == robot).drop("robot"))
+    for within in compare(frame, within=("robot",)):
+        some = rows.filter(pl.col("robot") == within["robot"])
+        assert 8 == len(some)
+        assert within["difference"] == pytest.approx(some["difference"].mean())
 
 
-def test_what_no_axis_explains_is_the_residual():
+def test_shares_of_the_variance_name_what_matters_and_last_what_no_axis_explains():
+    assert "home" == Answers(variants(effect=0)).shares("score")["source"][0]
     table = Answers(variants(noise=3.0)).shares("score")
     assert "residual" == table["source"][-1]
     assert table["share"][-1] > 0.1
@@ -220,14 +132,6 @@ def test_shares_of_nothing_are_zero_and_no_rounding_errors():
 
 def power(frame: pl.DataFrame, effect: float | None) -> pl.DataFrame:
     return Answers(frame).power("score", {"method": "old"}, effect)
-
-
-def test_more_homes_and_seeds_detect_smaller_differences():
-    table = power(variants(), None)
-    assert ["method", "seed", "home", "detectable"] == table.columns
-    assert table.sort("home", "seed")["detectable"][0] == table["detectable"].max()
-    by_home = table.filter(pl.col("seed") == 5).sort("home")["detectable"].to_list()
-    assert sorted(by_home, reverse=True) == by_home
 
 
 def test_an_effect_needs_the_more_homes_the_smaller_it_is():
@@ -266,6 +170,7 @@ def test_intervals_of_shares_and_of_their_differences_stay_within_what_is_possib
     table = answers.paired("score", {"method": "old"}, ["home"])
     assert 1 == table["high"][0]
     means = answers.summary("score", ["method"])
+    assert ["old", "m1"] == means["method"].to_list()
     assert means["low"].min() == 0  # type: ignore[comparison-overlap]
     assert means["high"].max() == 1  # type: ignore[comparison-overlap]
 
@@ -298,56 +203,35 @@ def test_tables_that_are_read_together_are_corrected_together():
     assert all(each.interval[0] < 0 < each.interval[1] for each in together)
 
 
-def test_a_clear_difference_of_few_homes_is_told_without_its_amount():
-    (row,) = compare(variants())
-    assert row["clear"]
-    assert "above old in 64 of 64 pairs; how much can't be told" in row["verdict"]
-    assert "with 8 homes, 43 % of studies miss a kind" in row["doubt"]
+HOMES = np.random.default_rng(4).uniform(0.3, 0.5, 30)
+VERDICTS = {
+    "few homes": (variants(homes=3, effect=0.05, noise=0.4), False, r"would show with .*homes \(now 3\)"),
+    "one pair": (by_method([1.0], [2.0]), False, "one pair only: no interval"),
+    "equal values": (variants(effect=0, noise=0), False, "the same as old in every pair$"),
+    "equal differences of three homes": (
+        by_method([1.0, 2.0, 4.0], [1.5, 2.5, 4.5]), False, "too few replicates to tell: a differ",
+    ),
+    "equal differences of eight homes": (
+        by_method([1.0] * 8, [1.5] * 8), True, "above old in 8 of 8 pairs; how much can't be told: all 8",
+    ),
+    "clear in few homes": (
+        variants(), True, "above old in 64 of 64 pairs; how much can't be told: with 8 homes, 43 %",
+    ),
+    "clear in enough homes": (variants(homes=30), True, "above old in 240 of 240 pairs$"),
+}  # fmt: skip
 
 
-def test_enough_homes_have_an_interval_that_is_told():
-    (row,) = compare(variants(homes=30))
-    assert "" == row["doubt"]
-    assert "above old in 240 of 240 pairs" == row["verdict"]
+@pytest.mark.parametrize("case", VERDICTS)
+def test_a_verdict_says_what_pairs_show(case):
+    frame, is_clear, words = VERDICTS[case]
+    (row,) = compare(frame)
+    assert is_clear == row["clear"]
+    assert re.match(f"(too few replicates to tell: .*)?{words}", row["verdict"])
+    assert math.isnan(row["low"]) == (case in ("one pair", *(c for c in VERDICTS if "equal" in c)))
 
 
 def test_a_verdict_says_what_is_better():
-    generator = np.random.default_rng(4)
-    old = generator.uniform(0.3, 0.5, 30)
-    worse = (old - generator.uniform(0.1, 0.2, 30)).tolist()
-    answers = Shares(by_method(old.tolist(), worse))
+    worse = HOMES - np.random.default_rng(5).uniform(0.1, 0.2, 30)
+    answers = Shares(by_method(HOMES.tolist(), worse.tolist()))
     (row,) = answers.paired("score", {"method": "old"}).to_dicts()
     assert "below old in 30 of 30 pairs, which is worse" == row["verdict"]
-
-
-def test_a_mean_against_most_pairs_tells_nothing_from_few_homes():
-    few = [-0.02, -0.01, -0.03, -0.02, 4.0, 4.2, 4.1]
-    (row,) = compare(by_method([0.0] * 7, few))
-    assert not row["clear"]
-
-
-@pytest.mark.parametrize(
-    ("difference", "p", "words"),
-    [(0.0, 1.0, "the same as old in every pair"), (0.5, 0.25, "too few replicates to tell")],
-)
-def test_equal_differences_of_three_homes_show_nothing(difference, p, words):
-    (row,) = compare(by_method([1.0, 2.0, 4.0], [1.0 + difference, 2 + difference, 4 + difference]))
-    assert (p, False) == (row["p"], row["clear"])
-    assert words in row["verdict"]
-    assert math.isnan(row["low"])
-    assert "all 3 values are equal" in row["doubt"]
-
-
-def test_equal_differences_of_eight_homes_are_clear():
-    (row,) = compare(by_method([1.0] * 8, [1.5] * 8))
-    assert row["clear"]
-    assert 2 / 2**8 == row["p"]
-    assert "above old in 8 of 8 pairs" in row["verdict"]
-
-
-def test_one_home_and_one_seed_have_no_interval():
-    answers = Answers(by_method([1.0], [2.0]))
-    (row,) = answers.paired("score", {"method": "old"}).to_dicts()
-    assert (False, True) == (row["clear"], math.isnan(row["low"]))
-    assert "one pair only" in row["verdict"]
-    assert "one value alone" in answers.summary("score", ["method"])["doubt"][0]

@@ -15,7 +15,6 @@ import fleet2d
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runs.run import Run
 from fleet2d.studies.api import default_location, map_runs
-from fleet2d.studies.executors import LocalExecutor
 
 SEEDED = [base("1 min", simulation={"seed": seed}) for seed in range(4)]
 
@@ -116,12 +115,6 @@ def test_a_script_needs_no_guard_around_its_main_code(tmp_path):
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
     )  # fmt: skip
     assert ("[3, 5]\n", 0) == (process.stdout, process.returncode), process.stderr
-
-
-@pytest.mark.slow
-def test_a_worker_that_holds_too_much_memory_is_replaced():
-    with LocalExecutor(1, memory_mb=1.0) as executor:
-        assert [0, 1] == map_runs(seed_of, SEEDED[:2], executor=executor)
 
 
 @pytest.mark.slow

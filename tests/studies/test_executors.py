@@ -46,12 +46,16 @@ def ends_of(crew: Crew, job: Any, homes: str) -> list[TaskEnd]:
         return list(itertools.chain.from_iterable(run_tasks(crew, job, queue(homes))))
 
 
-def test_a_worker_gets_the_tasks_of_a_home_together_and_the_last_home_is_shared():
-    assert ["aaa", "bbb", "cc", "c"] == homes_of(queue("abcabcabc"), workers=2)
-
-
-def test_tasks_of_one_home_are_shared_among_workers():
-    assert ["aaaa", "aa", "a", "a"] == homes_of(queue("a" * 8), workers=2)
+@pytest.mark.parametrize(
+    ("homes", "calls"),
+    [
+        ("abcabcabc", ["aaa", "bbb", "cc", "c"]),  # those of the last home are shared
+        ("aaaaaaaa", ["aaaa", "aa", "a", "a"]),
+        ("abcdef", ["abc", "de", "f"]),
+    ],
+)
+def test_a_worker_gets_the_tasks_of_a_home_together(homes, calls):
+    assert calls == homes_of(queue(homes), workers=2)
 
 
 def test_tasks_are_made_when_they_are_taken():
@@ -65,10 +69,6 @@ def test_what_a_dead_worker_held_is_next():
     tasks = queue("ab")
     tasks.put_back(tasks.take(2))
     assert ["a", "b"] == homes_of(tasks, workers=2)
-
-
-def test_a_worker_gets_several_homes_if_their_tasks_are_few():
-    assert ["abc", "de", "f"] == homes_of(queue("abcdef"), workers=2)
 
 
 def test_results_come_after_a_while_and_the_rest_is_run_then():

@@ -40,50 +40,14 @@ def coverage(homes: int, seeds: int, home: float, seed: float, noise: float, ske
     [
         (5, 5, 1.0, 0.0, 1.0, False),
         (5, 5, 1.0, 1.0, 1.0, False),
-        (10, 5, 1.0, 0.5, 1.0, False),
         (10, 10, 1.0, 0.0, 0.1, False),
         (1, 8, 0.0, 1.0, 1.0, False),
-        (8, 1, 1.0, 0.0, 1.0, False),
         (20, 5, 1.0, 0.5, 0.5, True),
     ],
 )
 def test_they_hold_the_truth_as_often_as_they_claim(homes, seeds, home, seed, noise, skewed):
     # 95 %, within 3 standard errors of 400 studies; a little less of skewed values.
     assert (0.90 if skewed else 0.917) < coverage(homes, seeds, home, seed, noise, skewed) <= 0.99
-
-
-def test_over_values_that_have_nothing_in_common_they_are_cautious():
-    assert coverage(5, 5, 0.0, 0.0, 1.0, False) >= 0.95
-
-
-def test_the_same_values_give_the_same_interval():
-    values = [0.1, 0.4, 0.2, 0.9]
-    assert estimate(values) == estimate(values)
-
-
-def test_an_interval_holds_its_mean():
-    mean = estimate([0.1, 0.4, 0.2, 0.9])
-    assert mean.low < mean.mean < mean.high
-    assert 0.4 == pytest.approx(mean.mean)
-
-
-def test_more_homes_make_it_narrower():
-    generator = np.random.default_rng(1)
-    of_home = generator.normal(1, 1, 40)
-    few, many = (
-        estimate(
-            np.repeat(of_home[:n], 3), {"home": np.repeat(np.arange(n), 3), "seed": [0, 1, 2] * n}
-        )
-        for n in (10, 40)
-    )
-    assert many.high - many.low < few.high - few.low
-
-
-def test_one_value_has_no_interval():
-    mean = estimate([0.5], {"home": [0], "seed": [0]})
-    assert 0.5 == mean.mean
-    assert math.isnan(mean.low)
-    assert math.isnan(estimate([]).mean)
 
 
 def test_equal_values_do_not_tell_how_much_others_differ():
@@ -122,10 +86,8 @@ def test_how_many_homes_would_do_is_what_shows_it_four_times_in_five():
     assert 0.7 < clear / 300 < 0.97  # known spread, so rather more than less
 
 
-@pytest.mark.parametrize("homes", [8, 15, 30])
-def test_they_hold_the_mean_of_homes_with_a_long_tail(homes):
-    generator = np.random.default_rng(homes)
-    samples = np.exp(generator.normal(0, 1, (5 * STUDIES, homes)))
+def test_they_hold_the_mean_of_homes_with_a_long_tail():
+    samples = np.exp(np.random.default_rng(15).normal(0, 1, (5 * STUDIES, 15)))
     means = [estimate(values) for values in samples]
     hits = [mean.low <= np.exp(0.5) <= mean.high for mean in means]
     by_student = [
@@ -173,14 +135,6 @@ def test_intervals_that_are_told_hold_the_truth(shape, design):
             assert 0.85 <= found.told
 
 
-def test_one_home_in_ten_that_is_eight_times_the_others_is_told_from_forty_homes_only():
-    few = BENCHMARK["coverage"](BENCHMARK["Case"]("one in ten", 10), 600)
-    many = BENCHMARK["coverage"](BENCHMARK["Case"]("one in ten", 40), 600)
-    assert few.contain < 0.75  # what no interval from ten homes can mend
-    assert (1, 0) == (few.untold, many.untold)
-    assert 0.90 <= many.contain <= 0.99
-
-
 def test_a_doubt_names_the_units_and_how_many_more_would_do():
     doubt = estimate(np.arange(10.0), {"home": range(10)}).doubt
     missed = "with 10 homes, 35 % of studies miss a kind that makes up a tenth of all"
@@ -197,13 +151,6 @@ def test_few_seeds_are_doubted_only_where_they_matter():
     assert "4 seeds" in estimate(of_home[home] + 3 * of_seed[seed], levels).doubt
 
 
-def test_many_seeds_do_not_make_up_for_few_homes():
-    generator = np.random.default_rng(6)
-    home, seed = np.divmod(np.arange(250), 50)
-    doubt = estimate(generator.normal(0, 1, 250), {"home": home, "seed": seed}).doubt
-    assert "5 homes" in doubt
-
-
 @pytest.mark.parametrize("values", [[0.0, 0.0, 0.0, 0.4], [0.99, 1.0, 1.0, 0.2], [0.0, 1.0]])
 def test_an_interval_of_shares_is_within_0_and_1(values):
     free, limited = estimate(values), estimate(values, limits=(0.0, 1.0))
@@ -214,6 +161,12 @@ def test_an_interval_of_shares_is_within_0_and_1(values):
 def test_values_outside_of_their_limits_are_not_cut():
     percent = [20.0, 40.0, 90.0]
     assert estimate(percent) == estimate(percent, limits=(0.0, 1.0))
+
+
+def test_one_value_has_no_interval():
+    mean = estimate([0.5], {"home": [0], "seed": [0]})
+    assert 0.5 == mean.mean
+    assert math.isnan(mean.low)
 
 
 @pytest.mark.parametrize("values", [[], [math.nan, 1.0], [1.0, math.inf]])

@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, run, small
 
 import fleet2d.studies.plan as plans
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.load import load_scenario
-from fleet2d.studies.design import _LEAVES, build_design, code_version, input_hash
+from fleet2d.studies.design import _LEAVES, build_design, input_hash
 from fleet2d.studies.driver import Observer, check_study
 from fleet2d.studies.executors import Crew, SerialExecutor
 from fleet2d.studies.plan import (
@@ -40,10 +39,6 @@ def test_identities_are_the_same_at_each_call_and_differ_among_variants():
     assert 6 == len(set(identities()))
 
 
-def test_identities_stay_when_other_values_come():
-    assert set(identities()) < set(identities(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=5))
-
-
 @pytest.mark.parametrize("change", [{"max_span": 60}, {"speedup": 1000}])
 def test_what_changes_no_result_changes_no_identity(change):
     assert identities() == identities(base=base(simulation=change))
@@ -70,11 +65,6 @@ def test_a_module_of_ones_own_is_part_of_the_identity(tmp_path):
     first_hash = input_hash(scenario)
     module.write_text(text + "# another\n")
     assert first_hash != input_hash(scenario)
-
-
-def test_the_code_has_a_version():
-    assert code_version().startswith("fleet2d ")
-    assert code_version() == code_version()
 
 
 def test_only_packages_that_run_or_show_simulations_are_no_part_of_that_version():
@@ -126,34 +116,9 @@ def test_of_a_fleet_the_first_homes_are_set_up_before_its_first_run(monkeypatch)
     assert 2 == checked["home_key"].n_unique()
 
 
-def test_two_variants_with_the_same_scenario_are_refused():
-    axes = {SPEED: [0.3], "again": {"key": SPEED, "values": [0.4, 0.5], "when": {}}}
-    rules = [{"set": {SPEED: 0.2}}]
-    with pytest.raises(ScenarioError, match="are the same scenario"):
-        plan(axes=axes, rules=rules)
-
-
-@pytest.mark.parametrize("table", ["room_share", "observations", "explored.astro"])
+@pytest.mark.parametrize("table", ["observations", "explored.astro"])
 def test_tables_that_variants_have_can_be_kept(table):
     assert check_study(small(keep={"tables": [table]}))
-
-
-def test_a_table_that_no_variant_has_is_refused():
-    with pytest.raises(ScenarioError, match="did you mean 'room_share'"):
-        check_study(small(keep={"tables": ["rom_share"]}))
-
-
-def test_variants_that_share_a_home_have_its_key():
-    homes = {"home": {"synthetic": 2}}
-    users = {"users": {"ana": {"type": "meander"}}}
-    study_plan = plan(axes=homes, base=base() | users, replicates=2)
-    keys = study_plan.variants["home_key"]
-    assert keys[0] == keys[1] != keys[2] == keys[3]
-
-
-def test_own_components_run_in_a_study():
-    own = {"share": {"type": f"{OWN}:Share", "period": "1 min"}}
-    assert check_study(small(base=base(algorithms=own), keep={"tables": ["share"]}))
 
 
 # --- Names ---------------------------------------------------------------------------------------
@@ -200,7 +165,7 @@ def test_a_name_that_no_variant_has_is_told_with_its_line(tmp_path, keys, place)
         check_study(tmp_path / "study.yaml")
 
 
-@pytest.mark.parametrize("pattern", ["*", "sight*", "*.ana", "sightings.a*", "[sd]*.ana", "d*.as*"])
+@pytest.mark.parametrize("pattern", ["*", "*.ana", "[sd]*.ana"])
 def test_patterns_that_fit_are_kept(pattern):
     assert check_study(small(keep={"metrics": [pattern]})) is not None
 
@@ -232,9 +197,6 @@ def test_variants_without_a_metric_are_noted(tmp_path):
 
     rules = [{"when": {SPEED: 0.6}, "set": {"metrics.sightings": None}}]
     keep = {"metrics": ["sightings.*", "distance.*", "room_share.ana.kitchen_1"]}
-    compare = [{"metric": "distance.astroo", "against": {SPEED: 0.3}}]
-    with pytest.raises(ScenarioError, match="'astroo', which no variant has"):
-        check_study(small(rules=rules, keep=keep, compare=compare))
     run(small(rules=rules, keep=keep), tmp_path, observer=Notes())
     assert "3 of 6 complete variants have no metric sightings.*" in notes
     assert not any("distance" in note for note in notes)

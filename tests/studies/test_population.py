@@ -9,14 +9,13 @@ from typing import Any
 import pytest
 from tests.scenes import flat_document
 from tests.studies.scenes import CountingExecutor, run
-from tests.studies.test_driver import CollectingObserver
 
 from fleet2d.configuration.documents import Document
-from fleet2d.errors import Fleet2DError, NoLayoutError, RunDirectoryError, ScenarioError
+from fleet2d.errors import Fleet2DError, NoLayoutError, ScenarioError
 from fleet2d.learning.datasets.specification import plan_dataset
 from fleet2d.studies import population
 from fleet2d.studies.design import Design, build_design
-from fleet2d.studies.households import bedrooms_needed, members_of
+from fleet2d.studies.households import bedrooms_needed
 from fleet2d.studies.lives import Draw, DrawSettings, HomeFeatures
 from fleet2d.studies.population import PopulationAxis, find_lives
 from fleet2d.studies.specification import read_specification
@@ -128,7 +127,6 @@ def test_lives_whose_homes_are_not_as_their_rows_say_are_left_out_and_counted(tm
     [
         ("home,weigt\n0,1\n", {"weight": "weight"}, "no column 'weight': did you mean 'weigt'"),
         ("home,weight\n0,1\n1,NaN\n", {}, "row 2: the weight is nan"),
-        ("home,weight\n0,1\n1,\n", {}, "row 2: the weight is None"),
         ("home,weight\n0,-1\n", {}, "row 1: the weight is -1"),
         ("home,weight\n0,0\n1,0\n", {}, "weight of all rows is 0"),
         ("home,weight\n", {}, "has no rows"),
@@ -211,21 +209,6 @@ def test_homes_of_files_are_chosen_among_those_that_fit_the_household(tmp_path):
     assert {(1, "flat1"), (1, "flat3"), (3, "flat3")} == homes
 
 
-def test_another_fleet_in_the_same_folder_is_told_and_nothing_is_lost(tmp_path):
-    run(fleet(2), tmp_path / "fleet")
-    with pytest.raises(RunDirectoryError, match="2 of scenarios that the study no longer has"):
-        run(fleet(2, seed=5), tmp_path / "fleet")
-    executor = CountingExecutor()
-    counts, _ = run(fleet(2), tmp_path / "fleet", executor)
-    assert 2 == counts.complete
-
-
-def test_what_is_left_out_is_noted_and_stored(tmp_path):
-    observer = CollectingObserver()
-    _, study = run(fleet(1, where={"people": 2}), tmp_path / "fleet", observer=observer)
-    assert "people is not 2" in study.meta.notes
-
-
 def test_a_cell_longer_than_a_name_of_a_file_is_no_file(tmp_path):
     """Data sets looked whether cells of key paths name files, and ended in a traceback."""
     log = tmp_path / "log.csv"
@@ -288,7 +271,3 @@ def test_data_sets_draw_and_leave_out_as_studies_do(tmp_path):
     (words,) = plan.left_out
     assert words.startswith("train: ")
     assert "household is not" in words
-
-
-def test_members_have_names_of_their_own():
-    assert ["ana", "ben"] == [*members_of(["retired", "student"])]

@@ -38,6 +38,7 @@ def test_variants_have_parameters_status_time_digest_and_metrics(study):
     assert SIGHTINGS in study.metrics
     assert (pl.Float64, pl.Int64) == (frame.schema[SPEED], frame.schema["seed"])
     assert frame[SIGHTINGS].is_between(0, 1).all()
+    assert 6 == len(study.pandas())
 
 
 def test_opening_loads_neither_the_simulator_nor_pandas(study):
@@ -80,10 +81,6 @@ def pa_rows(study: Study, variant: int):  # type: ignore[no-untyped-def]
     import pyarrow.compute as pc
 
     return study.arrow("room_share").to_table(filter=pc.field("variant") == variant)
-
-
-def test_variants_are_a_pandas_frame_too(study):
-    assert 6 == len(study.pandas())
 
 
 def test_any_parquet_reader_reads_it(study):
@@ -164,30 +161,8 @@ def test_a_description_with_other_types_is_damaged(study, tmp_path, change, reas
         _ = open_study(tmp_path).comparisons
 
 
-def test_paired_compares_the_same_seeds(study):
-    (row,) = study.paired(SIGHTINGS, {SPEED: 0.3}).to_dicts()
-    values = study.variants.pivot(SPEED, index="seed", values=SIGHTINGS)
-    differences = values["0.6"] - values["0.3"]
-    assert differences.mean() == pytest.approx(row["difference"])
-    assert (0.6, 3, 3) == (row[SPEED], row["pairs"], row["n_seed"])
-    assert row["low"] < row["difference"] < row["high"]
-
-
 def test_values_of_a_population_can_be_compared(study):
     """Seeds are units of every other comparison, but not of one between seeds."""
     table = study.paired("sightings.ana", {"seed": 0})
     assert "n_seed" not in table.columns
     assert len(table) == study.variants["seed"].n_unique() - 1
-
-
-def test_a_summary_has_a_row_for_each_value(study):
-    table = study.summary(SIGHTINGS, [SPEED])
-    assert [0.3, 0.6] == table[SPEED].to_list()
-    assert (table["low"] <= table["mean"]).all()
-
-
-def test_shares_of_the_variance_are_shares(study):
-    table = study.shares(SIGHTINGS)
-    assert table["share"].is_between(0, 1).all()
-    assert {SPEED, "seed", "residual"} == set(table["source"])
-    assert 1 == pytest.approx(table["share"].sum())

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import polars as pl
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -129,9 +128,3 @@ def test_results_that_name_files_of_others_delete_nothing(storage, tmp_path, nam
     storage.write_table(FILE, [rows])
     (problem,) = drop_damaged(storage)
     assert "is damaged" in problem
-
-
-def test_polars_and_others_read_the_folder(storage, tmp_path):
-    write(storage, result(1))
-    write(storage, result(2))
-    assert 2 == len(pl.read_parquet(tmp_path / "results/*.parquet"))

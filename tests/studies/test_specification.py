@@ -21,10 +21,6 @@ def test_a_file_is_called_by_its_name(tmp_path):
     assert "speeds" == read_text("name: speeds\n", tmp_path).name
 
 
-def test_the_bundled_scenario_is_the_base_of_those_without(tmp_path):
-    assert "bundled" == read_text("replicates: 2\n", tmp_path).base.data["floorplan"]["type"]
-
-
 def test_a_base_is_found_beside_the_study(tmp_path, monkeypatch):
     (tmp_path / "home.yaml").write_text("extends: bundled:paper\nsimulation: {duration: 3 h}\n")
     (tmp_path / "elsewhere").mkdir()

@@ -65,18 +65,14 @@ def tuned_study(
 
 
 def test_it_finds_what_is_better_on_homes_it_has_not_seen(tmp_path):
-    result = tuned(tmp_path)
+    spy = Spy()
+    result = tuned(tmp_path, spy)
+    assert {0, 1} == {task.index for task in spy.trials}
+    assert 6 == len({task.trial for task in spy.trials})
     assert 0.2 <= result.settings[SPEED] <= 1.0
     (row,) = result.held_out.paired("distance.astro", {"setting": "base"}).to_dicts()
     assert row["difference"] > 0
     assert {0.15} == set(result.held_out.variants["radius"])
-
-
-def test_it_runs_on_training_homes_only(tmp_path):
-    spy = Spy()
-    tuned(tmp_path, spy)
-    assert {0, 1} == {task.index for task in spy.trials}
-    assert 6 == len({task.trial for task in spy.trials})
 
 
 def test_it_goes_on_where_it_was_interrupted(tmp_path):
@@ -89,11 +85,6 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path):
     again = Spy()
     assert tuned(tmp_path, again).settings == result.settings
     assert [] == again.trials
-
-
-@pytest.mark.slow
-def test_it_runs_in_worker_processes(tmp_path):
-    assert 3 == tuned(tmp_path, LocalExecutor(1), trials=3).trials["complete"]
 
 
 def parameters(tmp_path: Path) -> list[tuple[Any, ...]]:

@@ -45,6 +45,7 @@ def test_formats_of_installed_packages_are_listed(monkeypatch):
         ("w.txt", "casas"),
         ("w", "rosbag2"),
         ("w.csv", "csv"),
+        ("w.perfetto", "perfetto"),
     ],
 )
 def test_suffix_of_a_file_tells_its_format(name, layout):

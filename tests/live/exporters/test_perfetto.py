@@ -5,7 +5,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pytest
 from tests.runs.test_robot_log import stored
 
 from fleet2d.live.exporters import Selection, export
@@ -89,9 +88,3 @@ def test_plans_come_from_the_repeated_run_if_decisions_were_not_stored(tmp_path)
     trace(tmp_path)
 
     assert (tmp_path / "trace.json").read_text() == (tmp_path / "without.json").read_text()
-
-
-@pytest.mark.parametrize("name", ["trace.json", "trace.perfetto"])
-def test_the_format_is_named_or_the_suffix(name, tmp_path):
-    layout = "perfetto" if name.endswith(".json") else None
-    assert "trace events" in export(stored(), tmp_path / name, layout, end=600)
