@@ -19,7 +19,7 @@ import pytest
 from fleet2d.algorithms.algorithm import load_learned
 from fleet2d.artifacts.arrow import read_parquet
 from fleet2d.artifacts.manifest import Manifest
-from fleet2d.bounds import BOUNDS, FILE_BYTES, Bound, one_line, read_bytes
+from fleet2d.bounds import FILE_BYTES, one_line, read_bytes
 from fleet2d.configuration.documents import parse, read_document
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.floorplan.load import load_floorplan
@@ -281,32 +281,21 @@ def test_a_bound_is_raised_by_the_environment(tmp_path, monkeypatch):
         read_bytes(path, FILE_BYTES)
 
 
-def test_bounds_have_names_of_their_own():
-    assert len(BOUNDS) == len({bound.variable for bound in BOUNDS})
-    assert all(isinstance(bound, Bound) and bound.default > 0 for bound in BOUNDS)
-
-
 @pytest.mark.parametrize(
     "override",
     [
-        f"simulation.duration={'9' * 400} s",
         f"simulation.duration={'9' * 5000} s",
-        f"simulation.duration={{days: {'9' * 400}}}",
         "simulation.duration=1e999 s",
         f"simulation.seed={'9' * 400}",
-        f"users.ana.speed={'9' * 400}",
         f"floorplan.cell={'9' * 4000}",
         f"users.{'x' * 10_000}.type=meander",
-        f"simulation.{'x' * 10_000}=1",
         f"users.ana.type={'x' * 10_000}",
         f"name=[{', '.join(['x'] * 5000)}]",
         f"simulation.start={'9' * 5000}",
         "simulation.start=0001-01-01",
         "simulation.seed=true",
         "simulation.speedup=1e-9",
-        "floorplan=[1, 2]",
         "floorplan.type=[1]",
-        "users.ana.type=[1]",
         "users=[1]",
         "floorplan=true",
         "metrics.distance.type={a: 1}",
@@ -325,14 +314,12 @@ def test_no_message_echoes_more_than_a_line(override):
     "settings",
     [
         {"floorplan": {"type": "bundled", "cell": "x"}},
-        {"floorplan": {"type": "bundled", "cell": [1]}},
         {"floorplan": {"type": "image", "path": "x.png", "resolution": {}}},
         {"floorplan": {"type": ["bundled"]}},
         {"floorplan": 3},
         {"users": {"ana": {"type": 4}}},
         {"users": {3: {"type": "meander"}}},
         {"seed": True},
-        {"seed": 4.5},
         {"duration": timedelta.max},
         {"start": datetime.max},
         {"duration": float("nan")},

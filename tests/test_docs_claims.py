@@ -248,23 +248,6 @@ def test_keys_of_a_study_are_those_of_the_page():
     assert set(StudyFile.model_fields) == said
 
 
-def test_what_the_paper_page_says_of_the_feedback_loop_is_in_its_table():
-    """The error of `likelihood` where all rooms are looked into, and of `audit_only` with rounds."""
-    text = page("paper")
-    errors = {
-        cells[0]: [float(cell.split()[0]) for cell in cells[1:]]
-        for cells in rows(text, "| robot | sighting share |")
-    }
-    likelihood = {robot: line[3] for robot, line in errors.items()}
-    least = likelihood.pop("hangout, 10 % of moves at random")
-    assert "stays at 0.04 to 0.07" in text
-    assert all(0.035 <= error < 0.075 for error in likelihood.values())
-    assert least == pytest.approx(0.29, abs=0.01)
-    clock = errors["hangout, 10 % rounds by the clock"]
-    assert f"is as good ({clock[2]:.3f} and {clock[3]:.3f})" in text
-    assert min(errors["hangout, 10 % of moves at random"]) == least
-
-
 # Homes, expectations
 
 

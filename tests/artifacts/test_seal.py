@@ -122,27 +122,22 @@ def test_digest_changes_with_names_kinds_categories_and_order():
     assert len(digests) == len(set(digests))
 
 
-def test_strings_are_told_apart_where_they_join():
-    spec = TableSpec("t", (Column("step", "step"), Column("said", "string")))
-
-    one = digest({"step": [0, 1], "said": ["ab", "c"]}, spec=spec)
-    assert one != digest({"step": [0, 1], "said": ["a", "bc"]}, spec=spec)
+NANS = np.array([0x7FF8000000000000, 0xFFF8000000000001], np.uint64).view(np.float64)
 
 
-def test_missing_value_is_not_zero():
-    spec = TableSpec("t", (Column("step", "step"), Column("x", "float64", nullable=True)))
-
-    missing = digest({"step": [0], "x": [np.nan]}, spec=spec)
-    assert missing != digest({"step": [0], "x": [0.0]}, spec=spec)
-
-
-def test_digest_of_nan_independent_of_its_bits():
-    spec = TableSpec("t", (Column("step", "step"), Column("x", "float64", nullable=True)))
-    nans = np.array([0x7FF8000000000000, 0xFFF8000000000001], np.uint64).view(np.float64)
-
-    assert digest({"step": [0], "x": nans[:1]}, spec=spec) == digest(
-        {"step": [0], "x": nans[1:]}, spec=spec
-    )
+@pytest.mark.parametrize(
+    ("column", "one", "other", "is_same"),
+    [
+        (Column("c", "string"), ["ab", "c"], ["a", "bc"], False),
+        (Column("c", "float64", nullable=True), [np.nan, 1], [0.0, 1], False),
+        (Column("c", "float64", nullable=True), NANS[[0, 0]], NANS[[1, 1]], True),
+    ],
+    ids=["where strings join", "a missing value and zero", "bits of nan"],
+)
+def test_digest_tells_values_apart_but_not_their_bits(column, one, other, is_same):
+    spec = TableSpec("t", (Column("step", "step"), column))
+    first, second = (digest({"step": [0, 1], "c": values}, spec=spec) for values in (one, other))
+    assert is_same == (first == second)
 
 
 def test_digest_known_value():
@@ -235,10 +230,7 @@ def test_any_change_of_bytes_is_noticed_and_its_file_named(run):
     [
         (lambda m: m["metrics"]["distance"].update(ana=1.0), "metrics.distance"),
         (lambda m: m["notes"].append("all is well"), "notes"),
-        (lambda m: m.update(start="2026-01-06T07:00:00"), "start"),
-        (lambda m: m["scenario"]["users"].clear(), "scenario.users"),
         (lambda m: m["tables"]["events"].update(rows=3), "tables.events"),
-        (lambda m: m["wall_s"].update(setup=0.0), "wall_s.setup"),
         (lambda m: m["metrics"].update(mine={}), "metrics.mine"),
         (lambda m: m["versions"].pop("numpy"), "versions.numpy"),
         (lambda m: m["seal"].update(digest="0" * 64), "seal"),
@@ -293,13 +285,6 @@ def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path):
         verify_run(tmp_path / "nothing")
 
 
-def test_the_seal_covers_a_run_of_plain_tables(tmp_path):
-    stored(rows_of_every_kind(50), directory=tmp_path / "run")
-    verification = verify_run(tmp_path / "run")
-    assert verification.same
-    assert 64 == len(verification.digest or "")
-
-
 # Manifests
 
 
@@ -308,19 +293,15 @@ def test_the_seal_covers_a_run_of_plain_tables(tmp_path):
     [
         (lambda m: m.update(steps="many"), ["steps", "'many'"]),
         (lambda m: m.update(steps=-1), ["steps", "-1"]),
-        (lambda m: m.update(steps=True), ["steps", "True"]),
         (lambda m: m.update(status="fine"), ["status", "'complete'", "'fine'"]),
         (lambda m: m.update(start="yesterday"), ["start", "'yesterday'"]),
         (lambda m: m.update(stats="complete"), ["stats", "did you mean 'status'?"]),
         (lambda m: m.pop("scenario"), ["lacks scenario"]),
-        (lambda m: m["tables"]["events"].update(rows=2.5), ["tables.events.rows", "2.5"]),
         (lambda m: m["tables"].update({"../../etc/x": {"rows": 0}}), ["tables.../../etc/x"]),
         (lambda m: m["tables"]["events"]["columns"][0].update(kind="blob"), ["tables.events.columns.0.kind", "'blob'"]),
         (lambda m: m["inputs"].append("/dev/zero"), ["inputs.0", "/dev/zero"]),
-        (lambda m: m["entities"].update(users="ana"), ["entities.users", "'ana'"]),
         (lambda m: m["seal"]["files"].update({"../x": {"bytes": 1, "sha256": "0" * 64}}), ["seal.files.../x"]),
         (lambda m: m.update(notes=[["x" * 10_000]]), ["notes.0", "…"]),
-        (lambda m: m.update(metrics=[]), ["metrics", "[]"]),
         (lambda m: m.update(digest="abc"), ["digest", "'abc'"]),
         # Pages, reports and pictures read these; they ended in tracebacks.
         (lambda m: m.update(step_us=0), ["step_us is 0"]),

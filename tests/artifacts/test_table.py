@@ -35,12 +35,6 @@ def test_column_refuses_a_category_named_twice():
         Column("x", "category", categories=("a", "a"))
 
 
-@pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden"])
-def test_table_refuses_a_name_that_is_no_file_name(name):
-    with pytest.raises(ArtifactError, match="can't be named"):
-        TableSpec(name, (Column("step", "step"),))
-
-
 @pytest.mark.parametrize("columns", [(), (Column("a", "int32"), Column("a", "bool"))])
 def test_table_refuses_no_columns_and_double_ones(columns):
     with pytest.raises(ArtifactError, match=r"no columns|twice"):
@@ -116,17 +110,6 @@ def test_append_of_all_scalars_to_strings_adds_one_row():
     assert [0] == chunk["b"].values.tolist()
     assert chunk["a"].valid is not None
     assert [False] == chunk["a"].valid.tolist()
-
-
-def test_many_small_appends_grow_the_buffer():
-    buffer = TableBuffer(POSES)
-
-    for step in range(1000):
-        append(buffer, step=[step], x=[step / 2])
-
-    chunk = buffer.take()
-    assert list(range(1000)) == chunk["step"].values.tolist()
-    assert [step / 2 for step in range(1000)] == chunk["x"].values.tolist()
 
 
 def test_fill_stops_at_the_limit_and_says_where():

@@ -5,16 +5,13 @@ import os
 import random
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
 from tests.thorough import examples
 
-from fleet2d.artifacts.arrow import schema_of, spec_of
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import DTYPES, Column, TableSpec
 from fleet2d.artifacts.unfinished import (
@@ -285,39 +282,6 @@ def test_rows_that_no_run_stores_are_refused(tmp_path, name, change, words):
     with_frames(path, forge)
     with pytest.raises(ArtifactError, match=f"journal is damaged .*{words}"):
         open_run(directory).arrow("every_kind")
-
-
-def test_two_tables_of_one_name_are_refused(tmp_path):
-    directory = kill(begin_run(tmp_path / "run"))
-    path = directory / FOLDER / JOURNAL_NAME
-
-    def rename(frames: list[Frame]) -> None:
-        for at, (kind, description, schema) in enumerate(frames):
-            if kind == "table":
-                renamed = replace(
-                    spec_of(pa.ipc.read_schema(pa.py_buffer(schema))), name="every_kind"
-                )
-                frames[at] = kind, description, schema_of(renamed).serialize().to_pybytes()
-
-    with_frames(path, rename)
-    with pytest.raises(ArtifactError, match=r"journal is damaged \(two tables have the name"):
-        open_run(directory).arrow("every_kind")
-
-
-def test_a_flipped_byte_ends_the_journal_before_it(tmp_path):
-    directory = kill(begin_run(tmp_path / "run"))
-    path = directory / FOLDER / JOURNAL_NAME
-    content = path.read_bytes()
-    for at in range(0, len(content), 997):
-        path.write_bytes(content[:at] + bytes([content[at] ^ 8]) + content[at + 1 :])
-        commit = last_commit(path)
-        assert commit is None or commit.end <= at
-
-
-def test_what_is_no_journal_has_no_commit(tmp_path):
-    assert last_commit(tmp_path / "nothing") is None
-    (tmp_path / "text").write_text("hello")
-    assert last_commit(tmp_path / "text") is None
 
 
 def test_one_run_has_one_writer(tmp_path):

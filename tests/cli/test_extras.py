@@ -101,14 +101,10 @@ MAP = f"floorplan.path={BOMBS / 'bomb-mcap.mcap'}"
 # A command, the modules that aren't there (none: all of all extras), and the extra that it names.
 LACKING = [
     ("view run --no-browser", "", "view"),
-    ("view run --no-browser", "uvicorn", "view"),
-    ("view home.yaml --no-browser", "", "view"),
     ("export run run.mp4", "", "viz"),
     ("export run run.mp4", "av", "film"),
     ("show run --out run.png", "", "viz"),
-    ("show bundled:paper --out plan.png", "", "viz"),
     ("export run run.mcap", "", "ros"),
-    ("export run bag", "", "ros"),
     ("study run study.yaml --out plain-study", "", "study"),
     ("study status st", "", "study"),
     ("study report st", "matplotlib", "viz"),
@@ -119,7 +115,6 @@ LACKING = [
     ("live home.yaml --with rosbridge://127.0.0.1:9 --speed 0", "", "rosbridge"),
     ("live home.yaml --with mqtt://127.0.0.1:9/x --speed 0", "", "mqtt"),
     ("mcp .", "", "mcp"),
-    ("mcp .", "mcp", "mcp"),
     ("run network.yaml --out net", "", "onnx"),
     ("fit perception log.csv", "", "calibrate"),
     ("validate floorplan.type=svg floorplan.path=plan.svg", "", "svg"),

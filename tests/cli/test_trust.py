@@ -1,7 +1,7 @@
 """No code of a stored run is run unless it is trusted; what would run is listed first."""
 
 import pytest
-from tests.scenes import fleet2d_process
+from tests.scenes import fleet2d_process, process
 
 OWN = """
 from pathlib import Path
@@ -23,7 +23,7 @@ def home(tmp_path_factory):
     override = "algorithms.count.type=mine:Count"
     done = fleet2d_process(
         "run",
-        "simulation.duration=2 h",
+        "simulation.duration=20 min",
         override,
         "--seed",
         "4",
@@ -34,11 +34,9 @@ def home(tmp_path_factory):
     )
     assert 0 == done.returncode, done.stderr
     code = (
-        "import fleet2d; s = fleet2d.Simulation('simulation.duration=2 h',"
-        f" {override!r}, seed=4, out='half'); s.advance(4000); s.finish()"
+        "import fleet2d; s = fleet2d.Simulation('simulation.duration=20 min',"
+        f" {override!r}, seed=4, out='half'); s.advance(600); s.finish()"
     )
-    from tests.scenes import process
-
     done = process("-c", code, cwd=folder)
     assert 0 == done.returncode, done.stderr
     (folder / "ran").unlink()

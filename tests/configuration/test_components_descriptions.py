@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import Field
 
-from fleet2d.configuration.components import Settings, components, descriptions, summary
+from fleet2d.configuration.components import Settings, components
 
 
 class Lamp(Settings):
@@ -41,18 +41,6 @@ def properties_of(cls: type[Settings]) -> dict[str, Any]:
         name: schema.get("description")
         for name, schema in cls.model_json_schema()["properties"].items()
     }
-
-
-def test_descriptions_are_those_of_the_class_and_its_bases():
-    assert descriptions(Torch) == {
-        "power": "Its power: what it takes on two lines [W].",
-        "most": "Its maximum.",
-        "color": "Its color.",
-    }
-
-
-def test_summary_ends_before_the_first_section():
-    assert summary(Lamp) == "A lamp.\n\nIt hangs."
 
 
 def test_schema_has_them_but_for_fields_with_a_description_of_their_own():

@@ -9,7 +9,7 @@ import pytest
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from fleet2d.configuration.problems import did_you_mean, problem_at, rewrite, suggest, unknown_key
+from fleet2d.configuration.problems import did_you_mean, problem_at, rewrite, suggest
 
 
 class Side(Enum):
@@ -61,17 +61,6 @@ def test_rewriting_moves_an_error():
     error = rewrite(problem_at(("a", "b"), "no {b}"), lambda line: {**line, "loc": ("c",)})
 
     assert [(("c",), "no {b}")] == [(e["loc"], e["msg"]) for e in error.errors()]
-
-
-@pytest.mark.parametrize(
-    ("key", "message"),
-    [
-        ("sped", "unknown key 'sped': did you mean 'speed'? Allowed here: radius, speed"),
-        (3, "unknown key 3. Allowed here: radius, speed"),
-    ],
-)
-def test_unknown_key_names_the_known(key, message):
-    assert message == str(unknown_key(key, ["speed", "radius"]))
 
 
 def test_nothing_near_is_not_guessed():

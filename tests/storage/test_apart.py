@@ -295,12 +295,6 @@ def test_coordinate_beyond_all_floats_is_refused():
         apart._decode(answer.replace(b"[9, 0]", b"[1e999, 0]"), FloorPlan)
 
 
-def test_right_answer_is_a_plan(tmp_path, monkeypatch):
-    monkeypatch.setattr(apart, "_CODE", answering(changed()))
-
-    assert 4 == load_floorplan(good(tmp_path)).area_m2
-
-
 TRIANGLE = [[0, 0], [9, 0], [9, 9]]
 
 

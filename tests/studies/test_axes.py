@@ -25,18 +25,16 @@ def values(x_axis: Axis, name: str = "x") -> list[Any]:
     return [choice.changes[0][1] for choice in x_axis.choices(name)]
 
 
-def test_values_are_their_own_labels():
-    assert [(0.3,), ("fast",)] == labels(axis(key=SPEED, values=[0.3, "fast"]))
-
-
-def test_values_with_a_type_are_called_by_it():
-    behaviors = [{"type": "patrol"}, {"type": "hangout", "source": "ltp"}]
-    assert [("patrol",), ("hangout",)] == labels(axis(key="robots.astro", values=behaviors))
-
-
-def test_values_that_can_not_be_told_apart_are_numbered():
-    lists = [[{"type": "patrol"}], [{"type": "find"}]]
-    assert [("1",), ("2",)] == labels(axis(key="robots.astro.behaviors", values=lists))
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        ([0.3, "fast"], [(0.3,), ("fast",)]),
+        ([{"type": "patrol"}, {"type": "find", "user": "ana"}], [("patrol",), ("find",)]),
+        ([[{"type": "patrol"}], [{"type": "find"}]], [("1",), ("2",)]),  # all the same otherwise
+    ],
+)
+def test_values_are_called_by_themselves_their_type_or_their_number(written, shown):
+    assert shown == labels(axis(key=SPEED, values=written))
 
 
 def test_a_value_can_be_set_for_several_keys():

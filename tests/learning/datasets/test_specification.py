@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 import fleet2d
-from fleet2d.errors import InputError, ScenarioError
+from fleet2d.errors import InputError
 from fleet2d.learning.datasets.specification import plan_dataset
 
 BASE = {"extends": "bundled:paper", "simulation": {"duration": "2 h"}}
@@ -22,20 +22,18 @@ def file(**splits: Any) -> dict[str, Any]:
 
 
 def test_every_run_has_its_own_seed_and_home_in_turn():
-    plan = plan_dataset(
-        file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
-    )
+    source = file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
+    plan = plan_dataset(source)
 
     runs = [*plan.runs("train"), *plan.runs("test")]
     assert [*range(8)] == [run.number for run in runs]
     assert 8 == len({run.seed for run in runs})
     assert ["0", "1", "0", "1", "0", "50", "51", "50"] == [run.labels["home"] for run in runs]
     assert ["ana", "ben"] == list(runs[-1].scenario["users"])
-    assert plan.digest == plan_dataset(plan_source(plan)).digest
-
-
-def plan_source(plan: Any) -> dict[str, Any]:
-    return file(train=split(5, 0, ["retired"]), test=split(3, 50, ["student", "child"]))
+    assert plan.digest == plan_dataset(source).digest
+    assert not {run.seed for run in plan_dataset({**source, "seed": 1}).runs("train")} & {
+        run.seed for run in runs
+    }
 
 
 def test_a_file_that_changes_makes_another_data_set(tmp_path):
@@ -55,15 +53,6 @@ def test_a_file_that_changes_makes_another_data_set(tmp_path):
     table.write_text(table.read_text().replace("0.6", "0.5"))
     digests.append(plan_dataset(source).digest)
     assert 3 == len({*digests})
-
-
-def test_another_seed_draws_other_runs():
-    source = file(train=split(3, 0, ["retired"], ["student"]))
-
-    one, other = plan_dataset(source), plan_dataset({**source, "seed": 1})
-
-    seeds = [{run.seed for run in plan.runs("train")} for plan in (one, other)]
-    assert not seeds[0] & seeds[1]
 
 
 @pytest.mark.parametrize(
@@ -86,14 +75,6 @@ def test_splits_that_overlap_name_what_they_share(test, words, tmp_path, monkeyp
 def test_a_split_is_named_as_its_folder_may_be(name):
     with pytest.raises(InputError, match="can't be the name of a split"):
         plan_dataset(file(**{name: split(1, 0, ["retired"])}))
-
-
-def test_a_home_is_the_same_by_any_name():
-    train, test = split(1, 0, ["retired"]), split(1, 0, ["child"])
-    test["homes"] = [{"values": [0], "key": "floorplan.seed"}]
-
-    with pytest.raises((InputError, ScenarioError)):
-        plan_dataset(file(train=train, test={**test, "homes": train["homes"]}))
 
 
 def test_axes_vary_each_run():

@@ -1,10 +1,14 @@
 """Scores of tasks: differences by home, in which each home counts alike."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 import fleet2d
 from fleet2d.learning.datasets.command import _print_scores
+from fleet2d.learning.datasets.reader import Dataset
 from fleet2d.learning.datasets.tasks import (
     LOWER_END,
     UPPER_END,
@@ -60,22 +64,29 @@ def test_the_table_has_a_column_for_each_model_and_intervals_in_its_cells(capsys
     ]
 
 
+def made(folder: Path, duration: str, *users: Any, **keys: Any) -> Dataset:
+    """Make a data set of a run for each of some households, each in a home of its own."""
+    splits = {
+        f"part{k}": {"runs": 1, "homes": [{"synthetic": 1, "first": k}], "households": [household]}
+        for k, household in enumerate(users)
+    }
+    base = {"extends": "bundled:paper", "simulation": {"duration": duration}}
+    return fleet2d.dataset({"base": base, "splits": splits, **keys}, folder / "made", workers=1)
+
+
+def models(entries: list[LeaderboardEntry]) -> list[tuple[str, int]]:
+    return [(entry.model, entry.cases) for entry in entries]
+
+
 @pytest.mark.slow
 def test_tuned_networks_are_scored_on_the_days_after_those_that_tuned_them(tmp_path):
-    people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
-    base = {"extends": "bundled:paper", "simulation": {"duration": "2 d"}}
-    source = {"base": base, "splits": {"test": people}, "beliefs": ["routine"], "every": "1 h"}
-    data = fleet2d.dataset(source, tmp_path / "made", workers=1)
+    data = made(tmp_path, "2 d", ["retired"], beliefs=["routine"], every="1 h")
 
-    entries = leaderboard(data, networks=Networks(tune=1))
+    entries = leaderboard(data, split="part0", networks=Networks(tune=1))
 
-    assert [(e.model, e.cases) for e in entries] == [
-        ("routine", 24),
-        ("learned", 24),
-        ("learned, tuned", 24),
-    ]
+    assert models(entries) == [("routine", 24), ("learned", 24), ("learned, tuned", 24)]
     assert entries[1].scores != entries[2].scores
-    assert leaderboard(data, networks=Networks(tune=2)) == []
+    assert leaderboard(data, split="part0", networks=Networks(tune=2)) == []
 
 
 @pytest.mark.slow
@@ -87,13 +98,9 @@ def test_moments_at_which_nobody_knows_where_a_person_is_have_no_label(tmp_path)
         for begin, end, room in [("00:00", "00:20", "Kitchen"), ("01:20", "03:00", "Bedroom")]
     )
     log.write_text("\n".join(lines))
-    user = {"type": "replay", "path": str(log), "format": "uci_adl"}
-    people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [{"ana": user}]}
-    base = {"extends": "bundled:paper", "simulation": {"duration": "2 h"}}
+    data = made(tmp_path, "2 h", {"ana": {"type": "replay", "path": str(log), "format": "uci_adl"}})
 
-    data = fleet2d.dataset({"base": base, "splits": {"test": people}}, tmp_path / "made", workers=1)
-
-    minutes = data.arrow("labels", "test")["step"].to_numpy() // 60
+    minutes = data.arrow("labels", "part0")["step"].to_numpy() // 60
     assert np.isin(np.arange(20), minutes).all()
     assert not np.isin(np.arange(25, 75), minutes).any()
     assert np.isin(np.arange(81, 119), minutes).all()
@@ -101,29 +108,14 @@ def test_moments_at_which_nobody_knows_where_a_person_is_have_no_label(tmp_path)
 
 @pytest.mark.slow
 def test_stored_beliefs_of_learned_and_homes_without_people_are_scored(tmp_path):
-    people = {"train": ["retired"], "test": ["student"], "nobody": []}
-    splits = {
-        name: {"runs": 1, "homes": [{"synthetic": 1, "first": k}], "households": [household]}
-        for k, (name, household) in enumerate(people.items())
-    }
-    base = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
-    source = {"base": base, "splits": splits, "beliefs": ["routine", "learned"]}
+    data = made(tmp_path, "1 h", ["student"], [], beliefs=["routine", "learned"])
 
-    data = fleet2d.dataset(source, tmp_path / "made", workers=1)
-
-    assert [(e.model, e.cases) for e in leaderboard(data, ["rtp"])] == [
-        ("routine", 8),
-        ("learned", 8),
-    ]
-    assert leaderboard(data, split="nobody") == []
+    assert models(leaderboard(data, ["rtp"], split="part0")) == [("routine", 8), ("learned", 8)]
+    assert leaderboard(data, split="part1") == []
 
 
 @pytest.mark.slow
 def test_beliefs_without_a_label_of_their_time_are_not_scored(tmp_path):
-    people = {"runs": 1, "homes": [{"synthetic": 1}], "households": [["retired"]]}
-    base = {"extends": "bundled:paper", "simulation": {"duration": "1 h"}}
-    source = {"base": base, "labels": "1 h", "splits": {"test": people}, "beliefs": ["routine"]}
+    data = made(tmp_path, "1 h", ["retired"], labels="1 h", beliefs=["routine"])
 
-    data = fleet2d.dataset(source, tmp_path / "made", workers=1)
-
-    assert leaderboard(data) == []
+    assert leaderboard(data, split="part0") == []

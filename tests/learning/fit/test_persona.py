@@ -11,6 +11,7 @@ from tests.thorough import THOROUGH, some
 
 from fleet2d import cli
 from fleet2d.configuration.documents import read_document
+from fleet2d.learning.fit import validation
 from fleet2d.learning.fit.command import fit_routine
 from fleet2d.learning.fit.persona import fit_persona, gaps, to_yaml
 from fleet2d.learning.fit.privacy import private_days, repeats
@@ -159,8 +160,7 @@ def test_a_markov_chain_keeps_the_shares_of_time(life):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", some(LOGS, 3))
 def test_days_of_real_logs_held_back_are_matched_as_well_as_by_copies(shared_data, name):
-    validation = validate(timeline_of(shared_data / "activity" / name))
-    persona, copies, chain, _ = validation.rooms
+    persona, copies, chain, _ = validate(timeline_of(shared_data / "activity" / name)).rooms
     assert persona.ks < copies.ks + 0.005
     assert persona.hours < copies.hours + 0.005
     assert persona.stay_min < copies.stay_min + 0.5
@@ -232,18 +232,22 @@ def test_what_was_done_on_one_day_only_is_not_in_a_private_persona():
 @pytest.mark.skipif(not THOROUGH, reason="FLEET2D_THOROUGH=1 has it")
 @pytest.mark.parametrize("name", LOGS)
 def test_a_private_persona_is_nearly_as_close_to_days_held_back(shared_data, name):
-    validation = validate(timeline_of(shared_data / "activity" / name), private=True)
-    (persona, _, chain, _), (exact, _, exact_chain, _) = validation.rooms, validation.seconds
+    found = validate(timeline_of(shared_data / "activity" / name), private=True)
+    (persona, _, chain, _), (exact, _, exact_chain, _) = found.rooms, found.seconds
     assert persona.hours < 0.55 * chain.hours
     assert exact.ks < 0.85 * exact_chain.ks
 
 
-def test_what_is_not_in_a_log_is_said():
-    minutes = np.zeros((6, DAY_MINUTES), np.int16)
-    minutes[:, 12 * 60 : 18 * 60] = -1
+def nights(days: int, *states: ActivityPlace) -> Timeline:
+    """Return days of the first state, and of the second from 23:00 to 07:00."""
+    minutes = np.zeros((days, DAY_MINUTES), np.int16)
     minutes[:, 23 * 60 :], minutes[:, : 7 * 60] = 1, 1
-    states = (ActivityPlace("", "kitchen"), ActivityPlace("sleep", "bedroom"))
-    timeline = Timeline(states, minutes, minutes.repeat(60, axis=1), None)
+    return Timeline(states, minutes, minutes.repeat(60, axis=1), None)
+
+
+def test_what_is_not_in_a_log_is_said():
+    timeline = nights(6, ActivityPlace("", "kitchen"), ActivityPlace("sleep", "bedroom"))
+    timeline.minutes[:, 12 * 60 : 18 * 60] = -1
     notes = "; ".join(gaps(timeline, find_days(timeline)))
     assert "25% of the time is unknown" in notes
     assert "never be" not in notes
@@ -254,10 +258,7 @@ def test_what_is_not_in_a_log_is_said():
 
 
 def test_rooms_whose_kind_nobody_knows_are_said():
-    minutes = np.zeros((6, DAY_MINUTES), np.int16)
-    minutes[:, 23 * 60 :], minutes[:, : 7 * 60] = 1, 1
-    states = (ActivityPlace("", "zimmer_9"), ActivityPlace("sleep", "bedroom"))
-    timeline = Timeline(states, minutes, minutes.repeat(60, axis=1), None)
+    timeline = nights(6, ActivityPlace("", "zimmer_9"), ActivityPlace("sleep", "bedroom"))
 
     assert (
         "rooms of no known kind: zimmer_9; in a home without such rooms the persona is in any room"
@@ -292,12 +293,6 @@ def test_stays_that_midnight_or_a_gap_cuts_are_left_out():
     assert [[], [5.0, 10.0]] == [list(x) for x in dwell_times(day[None], 2)]
 
 
-def test_equal_days_have_no_distance_and_shares_add_up(life):
-    count = len(life.places)
-    assert (0, 0, 0, 0, 0) == distances(life.rooms, life.rooms, count)
-    assert np.ones(24) == pytest.approx(by_hour(life.rooms, count).sum(axis=1))
-
-
 # The command
 
 
@@ -306,6 +301,8 @@ def test_the_command_writes_a_persona_and_a_picture_and_says_how_good_it_is(
     tmp_path, monkeypatch, capsys
 ):
     log = write_life(tmp_path, 12)
+    for name in ("SAMPLED", "CHAIN_DAYS", "SAMPLED_BY_SECOND", "CHAIN_DAYS_BY_SECOND"):
+        monkeypatch.setattr(validation, name, 7)
     monkeypatch.chdir(tmp_path)
     arguments = ["fit", "persona", str(log), "--out", "ana.yaml", "--picture", "ana.png"]
     monkeypatch.setattr("sys.argv", ["fleet2d", *arguments])

@@ -1,6 +1,5 @@
 """Runs as the history of a smart home, in the database of Home Assistant's recorder."""
 
-import itertools
 import sqlite3
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
@@ -13,7 +12,7 @@ from tests.scenes import run
 
 import fleet2d
 from fleet2d.errors import RunDirectoryError
-from fleet2d.live.exporters import export, format_of
+from fleet2d.live.exporters import export
 from fleet2d.logs.layouts.states import read_states
 
 STATES = """
@@ -77,12 +76,6 @@ def test_our_reader_of_recorders_reads_the_readings_of_sensors(
     table = stored.tables["sensors"].to_pylist()
     on = [f"binary_sensor.{row['sensor']}" for row in table if row["state"] in ("ON", "OPEN")]
     assert [name for name in shown if name.startswith("binary_sensor")] == on
-
-
-def test_a_database_is_its_suffix_and_the_states_of_each_entity_differ(database):
-    assert "home_assistant" == format_of(Path("home-assistant_v2.db"))
-    states = [state for state, _ in states_of(database, "sensor.astro_room")]
-    assert all(first != second for first, second in itertools.pairwise(states))
 
 
 def test_names_that_would_be_one_entity_are_refused(tmp_path):
