@@ -49,10 +49,10 @@ MERGES = "a0: &a0 {x: 1, y: 2}\n" + "".join(
 )
 
 
-def png(columns: int, rows: int) -> bytes:
+def png(columns, rows):
     """A picture of black pixels, a thousandth of what it unpacks to."""
 
-    def chunk(kind: bytes, content: bytes) -> bytes:
+    def chunk(kind, content):
         check = struct.pack(">I", zlib.crc32(kind + content))
         return struct.pack(">I", len(content)) + kind + content + check
 
@@ -63,7 +63,7 @@ def png(columns: int, rows: int) -> bytes:
     )
 
 
-def npz(size: int) -> bytes:
+def npz(size):
     """An array of zeros, packed to a thousandth."""
     target = io.BytesIO()
     with (
@@ -79,7 +79,7 @@ def npz(size: int) -> bytes:
     return target.getvalue()
 
 
-def parquet(path: Path, rows: int) -> None:
+def parquet(path: Path, rows):
     """A table of one value, repeated."""
     table = pa.table({name: pa.array(np.zeros(1 << 17)) for name in ("time", "x", "y")})
     with pq.ParquetWriter(path, table.schema) as writer:
@@ -148,7 +148,7 @@ def test_odd_yaml_is_refused_with_its_line(tmp_path, text):
     assert len(str(caught.value)) < 300 + len(str(path))
 
 
-def bomb(name: str, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
+def bomb(name, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
     """A file that unfolds to gigabytes, its reader, and the bound that stops it."""
     path = folder / name
     match name:

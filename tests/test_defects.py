@@ -2,7 +2,6 @@
 
 from datetime import timedelta
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -83,12 +82,12 @@ def test_path_every_wants_a_timedelta():
     stored = run(scenario("1 min", users={"ana": {"type": "meander"}}))
     assert 6 == len(stored.path("ana", every=timedelta(seconds=10)).step)
     with pytest.raises(ArtifactError, match=r"every: 1 has no unit"):
-        stored.path("ana", every=1)  # type: ignore[arg-type]
+        stored.path("ana", every=1)
 
 
 def test_sums_of_a_wrong_width_name_the_line_of_the_user():
     class Own(SightingShare):
-        def sums(self, evidence: Evidence) -> Any:
+        def sums(self, evidence: Evidence):
             return np.zeros((len(evidence), self.users + 1, 1))
 
     own = Own()
@@ -109,10 +108,10 @@ def test_two_people_who_react_and_a_robot_that_gives_way_take_no_minutes(monkeyp
     """15 s for two days: each reaction planned the rest of the day anew, each look of the robot."""
     work = {"legs": 0, "looks": 0}
 
-    def counted(owner: type, method: str, name: str) -> None:
+    def counted(owner: type, method, name):
         original = getattr(owner, method)
 
-        def counting(*args: Any, **more: Any) -> Any:
+        def counting(*args, **more):
             work[name] += 1
             return original(*args, **more)
 

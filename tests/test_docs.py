@@ -38,7 +38,7 @@ class Block:
     text: str
 
     @property
-    def where(self) -> str:
+    def where(self):
         return f"{self.page.relative_to(ROOT)}:{self.line}"
 
 
@@ -51,7 +51,7 @@ def blocks(page: Path, language: str | None = None) -> list[Block]:
     return [block for block in found if language in (None, block.language)]
 
 
-def pages_with(language: str) -> list[object]:
+def pages_with(language) -> list[object]:
     pages = [page for page in PAGES if blocks(page, language)]
     return [pytest.param(page, id=str(page.relative_to(ROOT))) for page in pages]
 
@@ -76,9 +76,9 @@ def commands() -> list[object]:
     return found
 
 
-def split_commands(line: str) -> list[list[str]]:
+def split_commands(line) -> list[list[str]]:
     """Split a shell line at `&&` into the words of each command, without what follows a `>`."""
-    parts: list[list[str]] = [[]]
+    parts = [[]]
     for word in shlex.split(line.partition(" > ")[0], comments=True):
         if word == "&&":
             parts.append([])
@@ -87,15 +87,15 @@ def split_commands(line: str) -> list[list[str]]:
     return [part for part in parts if part]
 
 
-def write_titled_blocks(page: Path, folder: Path) -> None:
+def write_titled_blocks(page: Path, folder: Path):
     for block in blocks(page):
         if block.title:
             (folder / block.title).write_text(block.text, encoding="utf-8")
 
 
-def run_notebook(page: Path) -> None:
+def run_notebook(page: Path):
     """Run the cells that a page has as a notebook, in order, in the present folder."""
-    names: dict[str, object] = {"__name__": "docs"}
+    names = {"__name__": "docs"}
     for number, cell in enumerate(notebook_of(page.read_text(encoding="utf-8"))["cells"]):
         first, _, rest = cell["source"].partition("\n")
         if first.startswith("%%writefile "):
@@ -168,7 +168,7 @@ def test_anchors_of_a_page_are_headings(page):
 
 
 @cache
-def anchors(page: Path) -> set[str]:
+def anchors(page: Path):
     """The anchors of a page's headings, as GitHub and the site make them."""
     text = FENCE.sub("", page.read_text(encoding="utf-8"))
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from pydantic import TypeAdapter
 from tests.pages import text_of as page
-from tests.scenes import run, table
+from tests.scenes import run
 
 import fleet2d
 from fleet2d import History, Plan, Present, Situation
@@ -25,14 +25,14 @@ from fleet2d.testing.claim import rate_test
 ROOT = Path(__file__).parent.parent
 
 
-def rows(text: str, head: str) -> Iterator[list[str]]:
+def rows(text, head) -> Iterator[list[str]]:
     """Yield the cells of the rows of the table whose heading begins so."""
     part = text[text.index(head) :].split("\n\n", 1)[0]
     for row in part.splitlines()[2:]:
         yield [cell.strip() for cell in row.strip().strip("|").split("|")]
 
 
-def names(cell: str) -> list[str]:
+def names(cell):
     return re.findall(r"`([a-z_0-9]+)", cell)
 
 
@@ -184,18 +184,6 @@ def test_the_bundled_month_is_as_the_pages_say():
     said = re.search(r"printed by `fleet2d run`: (0\.\d+) after the month", page("presence"))
     assert said is not None
     assert float(said[1]) == pytest.approx(month.metrics["ltp_error"]["ana"]["tv"], abs=0.0005)
-
-
-def test_people_of_different_households_ignore_each_other():
-    alone = {"ana": {"type": "routine", "persona": "retired"}}
-    both = {**alone, "ben": {"type": "routine", "persona": "student"}}
-    settings = {"simulation": {"duration": "1 d", "seed": 4}, "robots": {}}
-    home = {"floorplan": {"type": "bundled", "furnish": True}}
-    ways = [
-        table(run({**settings, **home, "users": users}), "key_frames", entity="ana")
-        for users in (alone, both)
-    ]
-    assert ways[0]["x"].tolist() == ways[1]["x"].tolist()
 
 
 # Interventions, tests, studies, security

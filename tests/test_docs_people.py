@@ -25,7 +25,7 @@ FOLDERS = {"CASAS AL": "casas_al", "UCI ADL A": "uci_adl_a", "HOMER+ A": "homer_
 NUMBER = re.compile(r"\d[\d,]*\.?\d*")
 
 
-def printed(script: str, *arguments: str) -> list[str]:
+def printed(script, *arguments):
     """Return the lines that a benchmark prints."""
     command = [sys.executable, f"{script}.py", *arguments]
     done = subprocess.run(
@@ -34,7 +34,7 @@ def printed(script: str, *arguments: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def rows(page: str, head: str) -> Iterator[tuple[str, list[str]]]:
+def rows(page, head) -> Iterator[tuple[str, list[str]]]:
     """Yield the first cell and the others of the rows of the table whose heading begins so."""
     text = text_of(page)
     for line in text[text.index(head) :].split("\n\n", 1)[0].splitlines()[2:]:
@@ -42,7 +42,7 @@ def rows(page: str, head: str) -> Iterator[tuple[str, list[str]]]:
         yield name.replace("\\_", "_"), cells
 
 
-def agrees(said: str, value: float, printed_to: float = 0.0) -> bool:
+def agrees(said, value, printed_to=0.0):
     """Whether a number of a page is a value, rounded to its digits; a percentage is a share."""
     number, unit = (said[:-1], 100) if said.endswith("%") else (said, 1)
     digits = len(number.strip().partition(".")[2])
@@ -97,7 +97,7 @@ def test_shares_of_rooms_are_as_near_as_the_page_says():
     ] == [errors[day] for day in (1, 4, 16, 64)]  # fmt: skip
 
 
-def overlaps(*arguments: str) -> dict[str, list[str]]:
+def overlaps(*arguments):
     """Return the seconds on one place and of overlaps, and how often somebody gives way."""
     lines = (line.split() for line in printed("overlaps", *arguments)[1:])
     return {" ".join(words[1:-4]): words[-4:-1] for words in lines}
@@ -150,7 +150,7 @@ def test_fitted_personas_are_as_near_to_their_logs_as_the_page_says(data, tmp_pa
         "Markov chain": "  a first-order Markov chain ", "`--private`": "a private persona ",
         "the other days": "  the days they were fitted on ",
     }  # fmt: skip
-    part: list[str] = []
+    part = []
     for log, (name, *cells) in rows("routines", "| log (days) | |"):
         if log:
             part = next(logs).splitlines()

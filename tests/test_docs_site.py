@@ -9,7 +9,6 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -27,13 +26,13 @@ class Loader(yaml.SafeLoader):
     """Reads the configuration of the site, whose tags are of no interest."""
 
 
-def nav() -> list[str]:
+def nav():
     """The pages that the navigation names."""
     text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     return list(leaves(yaml.load(text, Loader)["nav"]))
 
 
-def leaves(entry: Any) -> Iterator[str]:
+def leaves(entry) -> Iterator[str]:
     if isinstance(entry, str):
         yield entry
         return
@@ -47,7 +46,7 @@ def written() -> dict[str, str | bytes]:
     return site.written_pages()
 
 
-def words(text: str) -> int:
+def words(text):
     """The words of prose and tables that people wrote: no code, no links, nothing that a tool made."""
     text = re.sub(r"^```.*?^```$|`[^`\n]*`", "", text, flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"<!-- \w+: made by.*?<!-- end of \w+ -->", "", text, flags=re.DOTALL)
@@ -105,7 +104,7 @@ def test_a_tutorial_prints_and_draws_what_it_stores(path):
     assert (0, "") == (done.returncode, done.stdout.strip()), done.stderr[-2000:]
 
 
-def environment() -> dict[str, str]:
+def environment():
     """Numbers as on any machine, and no terminal that would change the width of tables."""
     return {**os.environ, "COLUMNS": "80", "POLARS_FMT_MAX_COLS": "8"}
 

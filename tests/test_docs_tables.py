@@ -1,7 +1,6 @@
 """Tables of keys and commands in the docs name what there is, with the defaults that it has."""
 
 import re
-from pathlib import Path
 from typing import Annotated, Any, cast
 
 import typer
@@ -20,7 +19,7 @@ IN_WORDS = re.compile(
 )
 
 
-def is_default(model: type[BaseModel], key: str, said: str) -> bool:
+def is_default(model: type[BaseModel], key, said):
     """Tell whether a key's default is what a page says, read as the key reads values."""
     field = model.model_fields[key]
     kind = cast("Any", Annotated[field.annotation, *field.metadata, field])
@@ -30,7 +29,7 @@ def is_default(model: type[BaseModel], key: str, said: str) -> bool:
     return bool(value == default or adapter.validate_python(default) == value)
 
 
-def rows_below(heading: str) -> list[list[str]]:
+def rows_below(heading) -> list[list[str]]:
     """Return the cells of each row of the table of the page on robots that has this heading."""
     rows = text_of("robots").split(heading)[1].split("\n\n", 1)[0].splitlines()[2:]
     return [[part.strip() for part in row.strip("|").split("|")] for row in rows]
@@ -72,7 +71,7 @@ def test_each_line_of_the_threat_model_names_its_tests():
     lines = [line.split("|")[3] for line in table.split("\n\n", 1)[0].splitlines()]
 
     assert len(lines) >= 9
-    paths: set[Path] = set()
+    paths = set()
     for line in lines:
         named = re.findall(r"`([^`]+)`", line)
         assert named, line

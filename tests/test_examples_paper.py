@@ -4,19 +4,14 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import polars as pl
 import pytest
 from examples.paper import reproduce as paper
 from examples.paper.reproduce import (
-    ESTIMATORS,
-    NAIVE_ESTIMATOR,
     NAIVE_GUESS,
     SIZES,
     PaperOptions,
     Result,
-    differences,
     draw,
     feedback,
     ltp_gap,
@@ -27,8 +22,6 @@ from examples.paper.reproduce import (
 
 from fleet2d.configuration.documents import read_document
 from fleet2d.scenario.load import load_scenario
-from fleet2d.studies.design import Design, build_design
-from fleet2d.studies.specification import read_specification
 
 
 def test_the_study_files_hold_the_sizes_of_the_paper():
@@ -52,9 +45,6 @@ PNG = b"\x89PNG\r\n\x1a\n"
 TINY = PaperOptions(quick=True, seeds=1, days=2)
 
 
-HANGOUTS = ("hangout, 10 % of moves at random", "hangout, 10 % rounds by the clock")
-
-
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     """The results that are months, of two days; that of most robots of one."""
@@ -64,7 +54,7 @@ def measured(tmp_path_factory):
     return {result.name: result for result in all_results}
 
 
-def numbers_of(result: Result) -> dict[str, Any]:
+def numbers_of(result: Result):
     return {name: value for name, value in result.numbers.items() if name != "seconds"}
 
 
@@ -90,36 +80,6 @@ def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     assert top_1[NAIVE_GUESS, "0-1 min"] > 0.9
     assert top_1[NAIVE_GUESS, "over 4 h"] < 0.2
     assert top_1["hmm", "over 4 h"] > 0.5
-
-
-def test_differences_are_paired_by_seed(measured):
-    errors = pl.DataFrame(measured["feedback"].numbers["tv"])
-    values = {(r["robot"], r["seed"], r["estimator"]): r["value"] for r in errors.to_dicts()}
-    robots = [*design_of(1).labels["robot"]]
-    assert robots == errors["robot"].unique(maintain_order=True).to_list()
-    less = differences(errors).to_dicts()
-    assert len(robots) * (len(ESTIMATORS) - 1) == len(less)
-    for row in less:
-        robot, seed, estimator = row["robot"], row["seed"], row["estimator"]
-        expected = values[robot, seed, estimator] - values[robot, seed, NAIVE_ESTIMATOR]
-        assert expected == row["value"]
-
-
-def design_of(seeds: int) -> Design:
-    return build_design(read_specification(study_content("feedback", seeds, 1)))
-
-
-def test_a_robot_goes_by_the_estimator_of_its_column_only():
-    design = design_of(1)
-    for index in range(len(design)):
-        labels, scenario = design.parameters(index), design.scenario(index).resolved()
-        behaviors = scenario["robots"]["astro"]["behaviors"]
-        sources = [b["source"] for b in behaviors if b["type"] == "hangout"]
-        uses_estimator = labels["robot"] in HANGOUTS
-        assert ([labels["estimator"]] if uses_estimator else []) == sources
-        expected = {labels["estimator"]} if uses_estimator else set(ESTIMATORS)
-        assert expected == set(scenario["algorithms"])
-        assert len(expected) == len(scenario["metrics"])
 
 
 # --- Speed --------------------------------------------------------------------------------------
@@ -170,7 +130,6 @@ def test_rows_are_measured_in_processes_of_their_own(monkeypatch, tmp_path):
 
 # --- The command ----------------------------------------------------------------------------------
 
-Output = tuple[int, str, str]
 SMALLEST = ("--quick", "--seeds", "1", "--days", "2", "--workers", "1")
 
 
@@ -179,7 +138,7 @@ def reproduce(monkeypatch, capsys, tmp_path):
     """The command in this process, in an empty folder: (exit code, stdout, stderr)."""
     monkeypatch.chdir(tmp_path)
 
-    def call(*arguments: str) -> Result:
+    def call(*arguments) -> Result:
         monkeypatch.setattr(sys, "argv", ["reproduce.py", *arguments])
         with pytest.raises(SystemExit) as caught:
             paper.main()

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -29,7 +28,7 @@ BASE = "extends: bundled:paper\nsimulation: {duration: 1 min}\n"
 def pipe(tmp_path):
     """A pipe that nobody writes; a test that waits for it fails."""
 
-    def fail(*_: object) -> None:
+    def fail(*_):
         raise AssertionError("it waited for a pipe")
 
     before = signal.signal(signal.SIGALRM, fail)
@@ -141,11 +140,11 @@ def test_what_is_no_name_is_refused(name):
     str(caught.value).encode()
 
 
-OPENED: list[str] | None = None
+OPENED = None
 """The paths that were opened, while a test records them."""
 
 
-def note_opened(event: str, arguments: tuple[Any, ...]) -> None:
+def note_opened(event, arguments):
     """Record a file, also one that is refused afterwards; the hook can't be removed again."""
     if OPENED is not None and event in ("open", "sqlite3.connect", "os.listdir", "os.scandir"):
         OPENED.append(str(arguments[0]))
@@ -165,7 +164,7 @@ def recorded() -> Iterator[list[str]]:
         OPENED = None
 
 
-def outside_of(opened: list[str], folder: Path) -> set[str]:
+def outside_of(opened, folder: Path):
     """Return which paths lead into the folder of secrets, or to files of the system."""
     real = {os.path.realpath(path) for path in opened}
     secret = os.path.realpath(folder)

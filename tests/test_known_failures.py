@@ -146,7 +146,7 @@ def test_known_failure_05_a_run_that_is_stored_is_there(tmp_path):
     assert [] == stored.verify()
 
 
-def effects(content: dict[str, Any]) -> Any:
+def effects(content):
     """Everything that can be told of a run: its tables, outputs and metrics, or its error."""
     try:
         simulation = Simulation(content)
@@ -157,7 +157,7 @@ def effects(content: dict[str, Any]) -> Any:
     return digests(stored), stored.metrics, outputs, stored.manifest["steps"]
 
 
-def life() -> dict[str, Any]:
+def life():
     """A scenario in which every key can matter."""
     items = [
         {"at": "06:00", "place": "bedroom"},
@@ -192,7 +192,7 @@ BODY = {
     "radius": 0.31, "speed": 0.9, "turn_rate_deg": 100, "start": "bathroom", "start_heading_deg": 12,
     "behaviors": [],
 }  # fmt: skip
-CHANGES: dict[tuple[type, str], dict[str, Any]] = {
+CHANGES = {
     (Camera, CAMERA): {
         "range": [0.5, 5], "angle_deg": 200, "detection": 0.5, "lost_after": "30 s",
         "offset": [0.1, 0.05], "heading_deg": 90, "pan": {"headings_deg": [-60, 60]},
@@ -291,7 +291,7 @@ CASES = [
 def test_known_failure_05_every_key_is_tried(cls):
     """A key that is added without a line in the table of this test fails here."""
     tried = {key for c, _, key, _ in CASES if c is cls} | {key for c, key in ELSEWHERE if c is cls}
-    assert set(cls.model_fields) == tried  # type: ignore[attr-defined]
+    assert set(cls.model_fields) == tried
 
 
 def test_known_failure_05_what_is_tried_elsewhere_is_tried_there():
@@ -320,7 +320,7 @@ def usual():
 def test_known_failure_05_every_key_has_an_effect(usual, cls, where, key, value):
     """`fov_provider`, `min_distance` and `max_distance` are accepted and ignored there."""
     content = copy.deepcopy(life())
-    section: Any = content
+    section = content
     for part in where.split("."):
         section = section[int(part)] if isinstance(section, list) else section[part]
     section[key] = value
@@ -352,7 +352,7 @@ def test_known_failure_06_rooms_cover_the_space_are_disjoint_and_never_empty(pla
         assert len({room.name for room in plan.rooms}) == len(plan.rooms), file.name
 
 
-def houseexpo(folder: Path, **content: Any) -> FloorPlan:
+def houseexpo(folder: Path, **content) -> FloorPlan:
     file = folder / "plan.json"
     file.write_text(json.dumps({"verts": [[0, 0], [6, 0], [6, 4], [0, 4]], **content}))
     return fleet2d.load_floorplan(file)
@@ -384,7 +384,7 @@ def test_known_failure_06_two_labels_on_one_box_are_one_room(tmp_path):
 def test_known_failure_07_the_area_stays_within_a_tolerance_or_it_is_an_error(plan_paths, cell):
     """At 0.2 m, outlines cross and up to 22 % of the area are lost there, without a word."""
     read = 0
-    refused: dict[str, str] = {}
+    refused = {}
     for file in plan_paths[::7] if cell < 0.05 else some(plan_paths[::3], 2):
         outline = shapely.Polygon(json.loads(file.read_text())["verts"])
         if not outline.is_valid:
@@ -459,14 +459,14 @@ def test_known_failure_09_a_run_without_a_seed_can_be_repeated(tmp_path):
 class Keep(Metric):
     """Keeps what it was handed, and compares it later."""
 
-    def start(self, home: Any) -> None:
+    def start(self, home):
         self.kept: list[tuple[Any, list[float], list[float]]] = []
 
-    def update(self, history: History, state: Present) -> None:
+    def update(self, history: History, state: Present):
         seen, pose = history.observations, history.poses("ana")
         self.kept.append(((seen, pose), seen.x.tolist(), pose.x.tolist()))
 
-    def result(self) -> dict[str, Any]:
+    def result(self):
         same = [a[0].x.tolist() == b and a[1].x.tolist() == c for a, b, c in self.kept]
         return {
             "same": all(same),
@@ -553,7 +553,7 @@ def test_known_failure_14_a_run_stops_at_its_last_full_step(duration, step, step
     """A duration that is no multiple of the step runs longer than asked there."""
     content = scenario(duration, users={"ana": "meander"}, simulation={"step": step})
     content["artifacts"] = {"trajectories": step}
-    told: list[int] = []
+    told = []
     simulation = Simulation(content)
     stored = simulation.run(lambda now: told.append(now.step))
     step_s = stored.manifest["step_us"] / 1e6

@@ -69,7 +69,7 @@ def without(copy: Path, missing: Sequence[str]) -> Iterator[None]:
         away.rmdir()
 
 
-def process(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
+def process(folder: Path, *arguments) -> "subprocess.CompletedProcess[str]":
     """Run Python with the copy, and without what an editable install puts in its place."""
     libraries = [path for path in sys.path if path.endswith("site-packages")]
     return subprocess.run(
@@ -83,7 +83,7 @@ def process(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]"
     )
 
 
-def commands_of(limb: str) -> set[str]:
+def commands_of(limb):
     """Return the commands that a limb adds."""
     return {e.name for e in entry_points(group=plugins.GROUP) if f".{limb}." in e.module}
 
@@ -134,7 +134,7 @@ def test_command_that_needs_a_missing_limb_names_it(copy):
     assert done.stderr.endswith("this needs fleet2d.studies, which is missing: reinstall fleet2d\n")
 
 
-def greet(name: str) -> None:
+def greet(name):
     """Greet somebody."""
     print(f"hello {name}")
 

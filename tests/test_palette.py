@@ -30,12 +30,12 @@ VISION = {
 }
 
 
-def linear(color: str) -> np.ndarray:
+def linear(color) -> np.ndarray:
     parts = np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
 
 
-def lab(color: str, vision: str) -> np.ndarray:
+def lab(color, vision) -> np.ndarray:
     """Return CIELAB (D65) of a colour as somebody sees it."""
     seen = np.clip(np.asarray(VISION[vision]) @ linear(color), 0, 1)
     to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
@@ -44,17 +44,17 @@ def lab(color: str, vision: str) -> np.ndarray:
     return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
 
 
-def nearest(colors: list[str], vision: str) -> float:
+def nearest(colors, vision):
     points = [lab(color, vision) for color in colors]
     return min(float(np.linalg.norm(a - b)) for a, b in combinations(points, 2))
 
 
-def contrast(one: str, other: str) -> float:
+def contrast(one, other):
     light, dark = sorted(linear(c) @ [0.2126, 0.7152, 0.0722] + 0.05 for c in (one, other))[::-1]
     return float(light / dark)
 
 
-def words() -> list[str]:
+def words():
     match = re.search(r"PALETTE = \[(.*?)\]", THEME.read_text(encoding="utf-8"))
     assert match
     return re.findall(r"#[0-9a-f]{6}", match[1])

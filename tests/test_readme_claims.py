@@ -23,17 +23,17 @@ PRIVATE = {"bedroom", "bathroom"}
 
 
 @cache
-def family(days: int, seed: int = 4) -> fleet2d.Run:
+def family(days, seed=4) -> fleet2d.Run:
     return fleet2d.run("bundled:family", f"simulation.duration={days} d", seed=seed)
 
 
-def kinds_visited(run: fleet2d.Run) -> set[str]:
+def kinds_visited(run: fleet2d.Run):
     """The kinds of rooms that the robot was in, at any second."""
     kinds = {room.name: room.type for room in run.plan.rooms}
     return {kinds.get(name, "") for name in rooms_of(run)}
 
 
-def text() -> str:
+def text():
     return README.read_text(encoding="utf-8")
 
 

@@ -4,7 +4,6 @@ import json
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -18,7 +17,7 @@ EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
 ]
 
 
-def text(name: str) -> str:
+def text(name):
     return (ROOT / name).read_text(encoding="utf-8")
 
 
@@ -44,7 +43,7 @@ def test_issue_form_has_what_forms_need(form):
 
 
 def test_container_and_development_container_install_extras_that_there_are():
-    content: dict[str, Any] = json.loads(text(".devcontainer/devcontainer.json"))
+    content = json.loads(text(".devcontainer/devcontainer.json"))
     for command in (content["postCreateCommand"], text("Dockerfile")):
         extras = re.findall(r"\[([a-z,]+)\]", command)
         assert extras

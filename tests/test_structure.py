@@ -59,9 +59,9 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
     return [set(group) for group in groups]
 
 
-def reachable(graph: dict[str, set[str]], name: str) -> set[str]:
+def reachable(graph: dict[str, set[str]], name):
     """Return the modules that a module imports, directly or not."""
-    reached: set[str] = set()
+    reached = set()
     waiting = [name]
     while waiting:
         new = graph[waiting.pop()] - reached
@@ -70,7 +70,7 @@ def reachable(graph: dict[str, set[str]], name: str) -> set[str]:
     return reached
 
 
-def imports(name: str, path: Path) -> Iterator[str]:
+def imports(name, path: Path) -> Iterator[str]:
     """Yield the modules that a module imports: at once, later, or for types only."""
     for node in definitions(path):
         if isinstance(node, ast.Import):
@@ -92,7 +92,7 @@ def definitions(path: Path) -> list[ast.Import | ast.ImportFrom | ast.ClassDef]:
     return [node for node in ast.walk(tree) if isinstance(node, kinds)]
 
 
-def base_of(node: ast.ImportFrom, name: str, path: Path) -> str:
+def base_of(node: ast.ImportFrom, name, path: Path):
     """Return the absolute name of the module that an import takes names from."""
     if not node.level:
         return node.module or ""
@@ -109,7 +109,7 @@ def test_map_of_packages_is_that_of_the_contract():
     assert names_in(drawn) == names_in(package_map.picture()), "run python tools/package_map.py"
 
 
-def names_in(picture: str) -> list[str]:
+def names_in(picture):
     """Return the first word of each line; what a package is may be said anew."""
     return [line.split()[0] for line in picture.splitlines()]
 
@@ -132,7 +132,7 @@ def test_files_that_contributing_names_are_there():
 
 @pytest.mark.slow
 def test_no_two_classes_have_the_same_name():
-    places: dict[str, list[str]] = {}
+    places = {}
     for module, path in MODULES.items():
         for node in definitions(path):
             if isinstance(node, ast.ClassDef):

@@ -15,7 +15,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 LOCKED_EXTRAS = ("test", "browser", "lint", "page")
 
 
-def needed(extra: str) -> list[Requirement]:
+def needed(extra) -> list[Requirement]:
     """Return the packages that an extra names, those of the extras that it includes among them."""
     found = []
     for requirement in map(Requirement, PROJECT["optional-dependencies"][extra]):
@@ -26,8 +26,8 @@ def needed(extra: str) -> list[Requirement]:
     return found
 
 
-def locked_versions() -> dict[str, list[str]]:
-    versions: dict[str, list[str]] = {}
+def locked_versions():
+    versions = {}
     for match in licenses.REQUIREMENT.finditer((ROOT / "requirements.lock").read_text("utf-8")):
         versions.setdefault(match["name"], []).append(match["version"])
     return versions

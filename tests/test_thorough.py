@@ -5,12 +5,12 @@ from hypothesis import strategies as st
 from tests.thorough import THOROUGH
 
 
-def drawn() -> list[int]:
+def drawn():
     """Return what a property test is given in one run."""
     values = []
 
     @given(st.integers())
-    def collect(value: int) -> None:
+    def collect(value):
         values.append(value)
 
     collect()

@@ -3,7 +3,6 @@
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -22,14 +21,14 @@ def fleet2d(fleet2d, monkeypatch, tmp_path):
     return fleet2d
 
 
-def written(content: Any, name: str = "home.yaml") -> Path:
+def written(content, name="home.yaml") -> Path:
     """Write a scenario in the current folder."""
     path = Path(name)
     path.write_text(content if isinstance(content, str) else yaml.safe_dump(content))
     return path
 
 
-def small(**sections: Any) -> dict[str, Any]:
+def small(**sections):
     return scenario(
         "5 min",
         **{
@@ -40,7 +39,7 @@ def small(**sections: Any) -> dict[str, Any]:
     )
 
 
-def changed(change: dict[str, Any]) -> dict[str, Any]:
+def changed(change):
     """The small scenario with sections replaced, and simulation keys merged."""
     content = small()
     for section, value in change.items():
@@ -49,7 +48,7 @@ def changed(change: dict[str, Any]) -> dict[str, Any]:
     return content
 
 
-def check(result: tuple[int, str, str], code: int, words: list[str], left: set[str]) -> None:
+def check(result: tuple[int, str, str], code, words, left):
     """Check exit code, words, that there is no traceback, and which files there are."""
     found, out, err = result
     assert code == found, err
@@ -62,7 +61,7 @@ def check(result: tuple[int, str, str], code: int, words: list[str], left: set[s
 
 # --- The scenario ------------------------------------------------------------------------------
 
-WRONG: dict[str, tuple[dict[str, Any] | str, list[str]]] = {
+WRONG = {
     "empty": ("", ["home.yaml", "empty"]),
     "no YAML": ("simulation: {duration: [\n", ["home.yaml:2", "not valid YAML"]),
     "a list": ("- simulation\n", ["home.yaml", "list"]),
@@ -159,7 +158,7 @@ def test_a_folder_for_a_scenario_is_refused(fleet2d):
 
 # --- The floor plan ----------------------------------------------------------------------------
 
-PLANS: dict[str, tuple[str, list[str]]] = {
+PLANS = {
     "no JSON": ("{", ["plan.json", "not JSON", "line 1"]),
     "not HouseExpo": ('{"walls": []}', ["plan.json", "not a HouseExpo plan", "verts"]),
     "a list": ("[1, 2]", ["plan.json", "a list"]),
@@ -223,7 +222,7 @@ def test_a_directory_that_nobody_can_make_is_refused(fleet2d):
     check(result, 2, ["error:", "/proc/fleet2d", "--out"], {"home.yaml"})
 
 
-def no_space(*args: object, **kwargs: object) -> None:
+def no_space(*args, **kwargs):
     raise OSError(28, "No space left on device")
 
 
@@ -243,7 +242,7 @@ def test_a_disk_full_from_the_start_fails_with_exit_1_and_leaves_nothing(fleet2d
     scenario_file = written(small())
     write = store.write_atomically
 
-    def full(path: Path, content: bytes) -> None:
+    def full(path: Path, content):
         if path.name == "floorplan.json":
             no_space()
         write(path, content)

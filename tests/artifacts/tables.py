@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,7 @@ EVERY_KIND = TableSpec(
 )
 
 
-def rows_of_every_kind(n: int, seed: int = 0) -> dict[str, Any]:
+def rows_of_every_kind(n, seed=0):
     """Return n random rows for EVERY_KIND, with missing values wherever they may be."""
     rng = np.random.default_rng(seed)
     step = np.sort(rng.integers(0, 10 * n + 1, n))
@@ -48,14 +47,12 @@ def rows_of_every_kind(n: int, seed: int = 0) -> dict[str, Any]:
     }
 
 
-def part(rows: dict[str, Any], start: int, stop: int) -> dict[str, Any]:
+def part(rows, start, stop):
     """Return a slice of rows."""
     return {name: values[start:stop] for name, values in rows.items()}
 
 
-def stored(
-    rows: dict[str, Any], *, spec: TableSpec = EVERY_KIND, pieces: int = 1, **options: Any
-) -> RunStore:
+def stored(rows, *, spec: TableSpec = EVERY_KIND, pieces=1, **options) -> RunStore:
     """Return a closed store that was given rows in so many pieces."""
     store = RunStore(options.pop("directory", None), [spec], **options)
     store.open()

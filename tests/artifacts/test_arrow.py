@@ -1,7 +1,5 @@
 """Columns as arrays, without pandas."""
 
-from typing import Any
-
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -27,7 +25,7 @@ def test_values_of_chunks_equal_those_of_pyarrow(kind, first, second):
 
     values = values_of(column)
 
-    expected: Any = column.to_numpy()
+    expected = column.to_numpy()
     assert values.tolist() == (expected.astype(np.int64) if kind == "time" else expected).tolist()
 
 

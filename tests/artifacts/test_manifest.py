@@ -48,7 +48,7 @@ def test_manifest_round_trip(tmp_path):
 def test_manifest_is_sorted_and_strict_json(tmp_path):
     Manifest(metrics={"b": math.nan, "a": np.float64(math.inf)}).write(tmp_path)
 
-    def refuse(word: str) -> None:
+    def refuse(word):
         pytest.fail(f"{word} is no JSON")
 
     text = (tmp_path / "manifest.json").read_text()

@@ -29,7 +29,7 @@ from .tables import EVERY_KIND, part, rows_of_every_kind, stored
 ROWS = rows_of_every_kind(500)
 
 
-def digest(rows: dict[str, Any], **options: Any) -> str | None:
+def digest(rows, **options) -> str | None:
     return stored(rows, **options).manifest.digest
 
 
@@ -63,8 +63,8 @@ def test_digest_table_independent_of_arrow_layout(tmp_path):
     assert expected == digest_table(plain_strings, EVERY_KIND)
 
 
-def _changed(name: str, value: Any) -> Callable[[dict[str, Any]], dict[str, Any]]:
-    def change(rows: dict[str, Any]) -> dict[str, Any]:
+def _changed(name, value) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    def change(rows):
         values = rows[name].copy()
         values[123] = value
         return {**rows, name: values}
@@ -100,7 +100,7 @@ def test_digest_changes_with_content(change):
 
 
 def test_digest_changes_with_names_kinds_categories_and_order():
-    def of(table: str, *columns: Column) -> str | None:
+    def of(table, *columns: Column) -> str | None:
         spec = TableSpec(table, columns)
         return digest({column.name: [0, 1] for column in columns} | {"step": [0, 1]}, spec=spec)
 
@@ -165,7 +165,7 @@ def run(tmp_path):
     return Path(shutil.copytree(STORED_RUN, tmp_path / "run"))
 
 
-def edited(directory: Path, change: Any) -> None:
+def edited(directory: Path, change):
     """Change the content of a manifest, and write it as it is always written."""
     path = directory / "manifest.json"
     content = json.loads(path.read_text())
@@ -369,7 +369,7 @@ ODD = [
 ]
 
 
-def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+def places(content, where=()):
     """All keys of a nested content."""
     paths = [where]
     entries = (
@@ -408,7 +408,7 @@ def test_no_edited_manifest_gives_a_traceback(run):
                 assert len(str(error)) < 2000, error
 
 
-def use_run(directory: Path) -> None:
+def use_run(directory: Path):
     run = open_run(directory)
     _ = run.plan, run.metrics, run.digest, repr(run)
     for name in run.tables:

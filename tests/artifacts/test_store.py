@@ -3,17 +3,13 @@
 import errno
 import os
 import subprocess
-import sys
-import time
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from pydantic import ValidationError
-from tests.thorough import some
 
 from fleet2d.artifacts import arrow
 from fleet2d.artifacts.manifest import Manifest
@@ -59,13 +55,13 @@ POSES = TableSpec("poses", (Column("step", "step"), Column("x", "float64")))
 NOISE = TableSpec("noise", (Column("x", "float64"),))
 
 
-def opened(directory: Path | None, *specs: TableSpec, **options: Any) -> RunStore:
+def opened(directory: Path | None, *specs: TableSpec, **options) -> RunStore:
     store = RunStore(directory, specs or (POSES,), **options)
     store.open()
     return store
 
 
-def names_in(directory: Path) -> list[str]:
+def names_in(directory: Path):
     return sorted(path.name for path in directory.iterdir())
 
 
@@ -211,7 +207,7 @@ def test_directory_without_permission_is_refused(tmp_path):
 
 @pytest.mark.parametrize("number", [errno.EACCES, errno.EROFS, errno.ENAMETOOLONG])
 def test_directory_that_cannot_be_made_is_refused(tmp_path, monkeypatch, number):
-    def refuse(*_: Any) -> None:
+    def refuse(*_):
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(Manifest, "write", refuse)
@@ -222,7 +218,7 @@ def test_directory_that_cannot_be_made_is_refused(tmp_path, monkeypatch, number)
 
 
 def test_disk_full_at_open_leaves_nothing(tmp_path, monkeypatch):
-    def refuse(_: Manifest, directory: Path) -> None:
+    def refuse(_: Manifest, directory: Path):
         (directory / "manifest.json.partial").write_text("half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -235,7 +231,7 @@ def test_disk_full_at_open_leaves_nothing(tmp_path, monkeypatch):
 
 
 def test_disk_full_marks_the_run_as_failed(tmp_path, monkeypatch):
-    def refuse(*_: Any) -> None:
+    def refuse(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     store = opened(tmp_path / "run", POSES, NOISE, flush_rows=10)
@@ -282,7 +278,7 @@ def test_disk_really_full(tiny_disk):
 
 
 def test_disk_full_at_the_manifest_leaves_whole_tables(tmp_path, monkeypatch):
-    def refuse(*_: Any) -> None:
+    def refuse(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     store = opened(tmp_path / "run")
@@ -312,7 +308,7 @@ def test_abandoned_run_is_readable(tmp_path):
 def test_words_of_an_interrupted_append_are_not_part_of_the_digest(tmp_path, monkeypatch):
     """The digest counted a word that no row has, so that `verify` found the table changed."""
 
-    def interrupt(*_: object, **__: object) -> None:
+    def interrupt(*_, **__):
         raise KeyboardInterrupt
 
     late = TableSpec("late", (Column("what", "category", nullable=True),))
@@ -333,7 +329,7 @@ def test_close_after_an_interrupted_close(tmp_path, monkeypatch):
     store = opened(tmp_path / "run", POSES, NOISE)
     store.append("poses", step=1, x=0.5)
 
-    def interrupt(_: Path) -> None:
+    def interrupt(_: Path):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -355,69 +351,6 @@ def test_close_again_gives_the_same(tmp_path):
     assert digests == store.close()
     assert digests == store.close()
     assert {"save": 0.25} == open_run(tmp_path / "run").manifest["wall_s"]
-
-
-CRASH = """
-import sys
-from pathlib import Path
-sys.path.insert(0, sys.argv[2])
-from tests_of_artifacts import EVERY_KIND, rows_of_every_kind
-from fleet2d.artifacts.store import RunStore
-from fleet2d.artifacts.table import TableSpec
-
-specs = [TableSpec(f"t{k}", EVERY_KIND.columns) for k in range(20)]
-store = RunStore(Path(sys.argv[1]), specs, flush_rows=200)
-store.open()
-rows = rows_of_every_kind(500)
-print("ready", flush=True)
-for round in range(3):
-    for spec in specs:
-        store.append(spec.name, **rows)
-    print("storing", flush=True)
-    if sys.argv[3] == "storing":
-        sys.stdin.read()
-print("closing", flush=True)
-store.close()
-print("closed", flush=True)
-sys.stdin.read()
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(os.name != "posix", reason="kill -9 is a matter of POSIX")
-def test_crash_never_leaves_a_file_that_looks_whole(tmp_path):
-    """Killed in the middle of storing, of closing, and just after.
-
-    The child waits for its end in the first case and in the last, whatever the machine is doing;
-    the others die somewhere between.
-    """
-    helper = (Path(__file__).parent / "tables.py").read_text(encoding="utf-8")
-    (tmp_path / "tests_of_artifacts.py").write_text(helper, encoding="utf-8")
-    seen = set()
-    for k, (word, delay) in enumerate(
-        some([("storing", 0), ("ready", 0.02), ("closing", 0), ("closing", 0.01), ("closed", 0)], 2)
-    ):
-        directory = tmp_path / f"run{k}"
-        command = [sys.executable, "-c", CRASH, str(directory), str(tmp_path), word]
-        with subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        ) as child:
-            assert child.stdout is not None
-            while child.stdout.readline().strip() != word:
-                assert child.poll() is None, "the child failed"
-            time.sleep(delay)
-            child.kill()
-
-        run = open_run(directory)
-        seen.add(run.status)
-        for path in directory.glob("*.parquet"):
-            assert 1500 == pq.read_table(path).num_rows
-        if run.status == "running":
-            assert any("crashed" in note for note in run.notes)
-            assert all(1500 == run.arrow(name).num_rows for name in run.tables)
-        else:
-            assert ("complete", []) == (run.status, run.verify())
-    assert {"running", "complete"} == seen
 
 
 def test_arrow_mid_run_shows_all_rows_and_keeps_the_digest():

@@ -1,7 +1,6 @@
 """Columns and tables are refused when they could not be stored."""
 
 from copy import deepcopy
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ from .tables import EVERY_KIND, rows_of_every_kind
 )
 def test_column_without_name_or_of_unknown_kind_is_refused(arguments, message):
     with pytest.raises(ArtifactError, match=message):
-        Column(*arguments)  # type: ignore[arg-type]
+        Column(*arguments)
 
 
 def test_column_refuses_categories_of_another_kind():
@@ -56,7 +55,7 @@ def of(*columns: Column) -> TableBuffer:
     return TableBuffer(TableSpec("t", columns))
 
 
-def append(buffer: TableBuffer, **columns: Any) -> None:
+def append(buffer: TableBuffer, **columns):
     buffer.fill(buffer.check(columns), 0)
 
 

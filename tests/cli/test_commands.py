@@ -31,15 +31,15 @@ def all_commands() -> Iterator[tuple[str, ...]]:
     group = typer.main.get_command(app)
     context = typer.Context(group)
     for name in (name for names in GROUPS.values() for name in names):
-        command = group.get_command(context, name)  # type: ignore[attr-defined]
+        command = group.get_command(context, name)
         yield (name,)
         for own in getattr(command, "commands", ()):
             yield name, own
 
 
-def described(help_text: str) -> dict[str, list[str]]:
+def described(help_text):
     """Return the lines of each section of a help text."""
-    sections: dict[str, list[str]] = {}
+    sections = {}
     for part in help_text.split("\n\n"):
         heading, *lines = part.strip("\n").splitlines()
         sections[heading.strip().rstrip(":")] = [line.strip() for line in lines]
@@ -87,7 +87,7 @@ def test_help_of_each_command_ends_in_examples_that_are_valid(words, fleet2d):
         parse(arguments)
 
 
-def parse(arguments: list[str]) -> None:
+def parse(arguments):
     """Parse the arguments of a command, and of one within it, without calling it."""
     command = typer.main.get_command(app)
     context = typer.Context(command)
@@ -108,7 +108,7 @@ def test_command_of_an_installed_package_is_listed_below_the_own(fleet2d, monkey
     assert ["dust        Sweep."] == described(out)["Installed"]
 
 
-def dust() -> None:
+def dust():
     """Sweep."""
 
 

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -19,7 +18,7 @@ import fleet2d
 from fleet2d.cli import extra_with
 
 PROJECT = tomllib.loads((TESTS.parent / "pyproject.toml").read_text())["project"]
-EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
+EXTRAS = PROJECT["optional-dependencies"]
 HIDING = """
 import os
 import sys
@@ -39,20 +38,20 @@ OTHERS = {"paho-mqtt": "paho"}
 TOOLS = ("test", "browser", "page", "lint", "docs", "build", "cluster")
 
 
-def packages(extra: str) -> list[str]:
+def packages(extra):
     """The packages that an extra installs by itself."""
     names = [line.partition(">")[0].partition("[")[0] for line in EXTRAS[extra]]
     return [name for name in names if name != "fleet2d"]
 
 
-def modules() -> str:
+def modules():
     """All modules of all extras, as a list with commas."""
     names = {name for extra in EXTRAS if extra not in TOOLS for name in packages(extra)}
     return ",".join(sorted(OTHERS.get(name, name) for name in names))
 
 
 SCENARIO = {"extends": "bundled:paper", "simulation": {"duration": "5 min"}}
-FILES: dict[str, Any] = {
+FILES = {
     "home.yaml": SCENARIO,
     "network.yaml": {
         **SCENARIO,
@@ -90,7 +89,7 @@ def folder(tmp_path_factory):
     return root
 
 
-def without(folder: Path, hidden: str, command: str) -> subprocess.CompletedProcess[str]:
+def without(folder: Path, hidden, command) -> subprocess.CompletedProcess[str]:
     """Run a command without some modules."""
     path = os.pathsep.join([str(folder / "hiding"), *sys.path])
     arguments = ("-m", "fleet2d.cli", *command.split())

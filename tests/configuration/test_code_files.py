@@ -7,7 +7,7 @@ import pytest
 from fleet2d.configuration.code_files import with_imports
 
 
-def names(folder: Path, *files: str) -> list[str]:
+def names(folder: Path, *files):
     paths = with_imports([folder / name for name in files], folder)
     return [path.relative_to(folder).as_posix() for path in paths]
 

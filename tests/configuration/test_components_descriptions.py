@@ -1,7 +1,5 @@
 """Descriptions of fields: taken from docstrings, also those of base classes."""
 
-from typing import Any
-
 from pydantic import Field
 
 from fleet2d.configuration.components import Settings, components
@@ -36,7 +34,7 @@ class Torch(Lamp):
     battery: int = 3
 
 
-def properties_of(cls: type[Settings]) -> dict[str, Any]:
+def properties_of(cls: type[Settings]):
     return {
         name: schema.get("description")
         for name, schema in cls.model_json_schema()["properties"].items()

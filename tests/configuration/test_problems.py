@@ -19,11 +19,11 @@ class Side(Enum):
     RIGHT = "right"
 
 
-def _refuse(_: object) -> object:
+def _refuse(_):
     raise ValueError("never good enough")
 
 
-def _refuse_specially(_: object) -> object:
+def _refuse_specially(_):
     raise PydanticCustomError("special", "{what} {{x}}", {"what": "it is {what}"})
 
 

@@ -2,7 +2,6 @@
 
 import json
 import socket
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -23,9 +22,6 @@ from fleet2d.entities.plan import data_of
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.interventions import Decide
 from fleet2d.studies.reader import open_study
-
-Result = tuple[int, str, str]
-Cli = Callable[..., Result]
 
 CODE = """
 from pathlib import Path
@@ -94,7 +90,7 @@ def test_an_own_scenario_that_is_watched_runs_what_it_names(fleet2d):
     assert Path("ran").exists()
 
 
-def elsewhere(folder: Path, store: Path, name: str) -> Path:
+def elsewhere(folder: Path, store: Path, name) -> Path:
     """Let a stored file name code that this process hasn't loaded, as from another machine."""
     other = folder / "other"
     other.mkdir()
@@ -193,7 +189,7 @@ class Never(fleet2d.Interrupt):
 """
 
 
-def half_a_run(name: str) -> package.Simulation:
+def half_a_run(name) -> package.Simulation:
     """A driven robot whose plan waits for an interrupt; the file in which it is isn't loaded."""
     Path("theirs.py").write_text(INTERRUPT)
     simulation = package.Simulation(

@@ -5,7 +5,7 @@ import pickle
 from datetime import timedelta
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import pytest
 from hypothesis import given
@@ -38,11 +38,11 @@ from fleet2d.configuration.units import (
 from fleet2d.errors import ScenarioError
 
 
-def read(type_: Any, value: object) -> Any:
+def read(type_, value):
     return TypeAdapter(type_).validate_python(value)
 
 
-def message(type_: Any, value: object) -> str:
+def message(type_, value):
     with pytest.raises(ValidationError) as caught:
         read(type_, value)
     return str(caught.value.errors()[0]["msg"])
@@ -167,7 +167,7 @@ def test_quantity_says_what_is_wrong(type_, written, said):
      (timedelta(hours=1), 3600, "01:00")],
 )  # fmt: skip
 def test_time_of_day_is_the_time_since_midnight(written, seconds, dumped):
-    adapter: TypeAdapter[timedelta] = TypeAdapter(TimeOfDay)
+    adapter = TypeAdapter(TimeOfDay)
     value = adapter.validate_python(written)
 
     assert (timedelta(seconds=seconds), dumped) == (value, adapter.dump_python(value, mode="json"))

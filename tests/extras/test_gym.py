@@ -59,18 +59,6 @@ def test_gymnasium_has_no_complaint(task):
     check_env(env, skip_render_check=True)
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_actions_are_sampled_by_the_mask(task):
-    env = RobotEnv(short(task), masked="error")
-    _, info = env.reset(seed=1)
-
-    assert np.int8 == info["action_mask"].dtype
-    for _ in range(20):
-        _, _, _, is_over, info = env.step(env.action_space.sample(info["action_mask"]))
-        if is_over:
-            break
-
-
 @pytest.mark.filterwarnings("ignore:Your observation")  # a table, for which it has no network
 def test_stable_baselines_has_no_complaint():
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="not installed")
@@ -91,17 +79,6 @@ def test_pettingzoo_has_no_complaint():
 
     parallel_api_test(RobotsEnv({"scenario": two_robots()}), num_cycles=60)
     parallel_seed_test(lambda: RobotsEnv({"scenario": two_robots()}), num_cycles=20)
-
-
-def test_robots_sample_their_actions_by_their_masks():
-    env = RobotsEnv({"scenario": two_robots()}, masked="error")
-    _, infos = env.reset(seed=1)
-    for _ in range(10):
-        masks = {robot: infos[robot]["action_mask"] for robot in env.agents}
-        actions = {robot: env.action_space(robot).sample(mask) for robot, mask in masks.items()}
-        *_, infos = env.step(actions)
-
-    assert {np.dtype(np.int8)} == {info["action_mask"].dtype for info in infos.values()}
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -153,11 +130,6 @@ def test_reward_may_be_a_function():
     assert all(reward == info["elapsed_s"] for _, reward, *_, info in play(env, 1, steps=1))
 
 
-def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name():
-    with pytest.raises(Exception, match="relocations"):
-        RobotEnv(flat(), reward={"relocation": 1.0})
-
-
 @pytest.mark.parametrize(
     ("vary", "message"),
     [
@@ -173,15 +145,6 @@ def test_unknown_term_of_a_reward_is_an_error_with_the_nearest_name():
 def test_wrong_values_of_what_varies_are_an_error_that_says_which(vary, message):
     with pytest.raises(InputError, match=message):
         RobotEnv({"scenario": load_task("hangout").scenario, "vary": vary})
-
-
-def test_values_may_be_whole_sections_of_the_scenario():
-    users = [{"ana": {"type": "routine", "persona": name}} for name in ("student", "retired")]
-    env = RobotEnv({"scenario": flat(), "vary": {"users": {"train": users}}})
-
-    env.reset(seed=1)
-
-    assert set(env.present.simulation.scenario.users) == {"ana"}
 
 
 def test_unknown_option_of_a_reset_is_an_error_and_keeps_the_life():
@@ -341,14 +304,6 @@ def test_reset_in_the_middle_begins_anew_and_nothing_grows():
     assert counts[2] - counts[1] < 200
 
 
-def test_run_of_a_life_is_stored_as_any_other():
-    env = RobotEnv(flat())
-    list(play(env, seed=1))
-
-    assert "complete" == env.run().status
-    assert {"trajectories", "events", "observations"} <= set(env.run().tables)
-
-
 def test_policies_from_files_repeat_the_episode(tmp_path):
     path = tmp_path / "policy.onnx"
     path.write_bytes(scores_of_rooms("visited_20min", "visited_6h"))
@@ -429,19 +384,18 @@ def test_task_draws_homes_apart_for_each_split(task):
     assert sum(map(len, homes)) == len(set.union(*homes))
 
 
-def test_unknown_split_has_the_nearest_name():
-    with pytest.raises(InputError, match="did you mean 'validation'"):
-        RobotEnv("hangout", split="validate")  # type: ignore[arg-type]
-
-
-def test_task_without_a_policy_says_what_to_give():
-    with pytest.raises(InputError, match="first behavior is a policy"):
-        RobotEnv({"scenario": "bundled:paper"})
-
-
-def test_unknown_task_has_the_nearest_name():
-    with pytest.raises(InputError, match="hangout"):
-        RobotEnv("hangot")
+@pytest.mark.parametrize(
+    ("task", "settings", "message"),
+    [
+        ("hangot", {}, "hangout"),
+        ("hangout", {"split": "validate"}, "did you mean 'validation'"),
+        ({"scenario": "bundled:paper"}, {}, "first behavior is a policy"),
+        ({"scenario": flat()}, {"reward": {"relocation": 1.0}}, "relocations"),
+    ],
+)
+def test_wrong_settings_are_an_error_with_the_nearest_name(task, settings, message):
+    with pytest.raises(Exception, match=message):
+        RobotEnv(task, **settings)
 
 
 def test_picture_of_a_life_shows_the_scores():

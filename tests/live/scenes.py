@@ -1,11 +1,10 @@
 """Live scenes that tests share."""
 
 from functools import cache
-from typing import Any
 
 import fleet2d
 
-LIVE: dict[str, Any] = {
+LIVE = {
     "extends": "bundled:paper",
     "simulation": {"duration": "30 s", "seed": 4, "start": "2026-01-05T12:00"},
     "users": {"ana": {"type": "live"}},
@@ -17,6 +16,6 @@ LIVE: dict[str, Any] = {
 
 
 @cache
-def place(room: str = "kitchen_1") -> tuple[float, float]:
+def place(room="kitchen_1") -> tuple[float, float]:
     """Return a place in the middle of a room of the bundled home."""
     return next(r.anchor_xy for r in fleet2d.load_floorplan().rooms if r.name == room)

@@ -4,7 +4,6 @@ import asyncio
 import json
 import os
 import time
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -174,7 +173,7 @@ def test_the_query_of_the_description_sums_durations(place):
 
     events = place.ask("first", "events", "event = 'activity'", ["detail", "epoch(time) AS at"])
     acts = events["shown"]
-    lasts: dict[str, float] = {}
+    lasts = {}
     for act, after in pairwise(acts):
         lasts[act["detail"]] = lasts.get(act["detail"], 0) + after["at"] - act["at"]
     assert len(acts) > 2
@@ -200,7 +199,7 @@ def test_a_json_file_leads_nowhere_else(place, text):
     "name", ["\0", "a\0.yaml", "\x1b[2J.yaml", "a\nb.yaml", "\ud800.yaml", "x" * 5000 + ".yaml"]
 )
 def test_odd_names_are_refused_in_one_line(place, name):
-    uses: list[Callable[[str], object]] = [
+    uses = [
         place.read, lambda n: place.write(n, "x"), place.check, place.picture, place.begin,
         lambda n: place.run("home.yaml", n), lambda n: place.ask(n, "events"), place.finish,
         lambda n: place.ask("first", n), lambda n: place.ask("first", "events", n),
@@ -246,7 +245,7 @@ def test_a_call_simulates_for_a_limited_time(place, monkeypatch):
     assert place.advance(name, "1 min")["state"]["ana"]
 
 
-def busy(*_: object, **__: object) -> None:
+def busy(*_, **__):
     """Compute for longer than a call may take."""
     end = time.monotonic() + 30
     while time.monotonic() < end:

@@ -19,7 +19,7 @@ from fleet2d.live import Bridge, LiveStep, from_iterator, open_peers, to_functio
 class Now:
     """A peer that sends messages before the steps for which it has some."""
 
-    def __init__(self, messages: dict[int, list[Any]]) -> None:
+    def __init__(self, messages):
         self.messages, self.frames, self.told, self.ended = (
             messages,
             list[LiveStep](),
@@ -27,31 +27,31 @@ class Now:
             "",
         )
 
-    def open(self, simulation: Any, post: Any) -> None:
+    def open(self, simulation, post):
         self.post = post
         self._give(0)
 
-    def _give(self, step: int) -> None:
+    def _give(self, step):
         for message in self.messages.get(step, ()):
             self.post(message)
 
-    def send(self, frame: LiveStep) -> None:
+    def send(self, frame: LiveStep):
         self.frames.append(frame)
         self._give(frame.step + 1)
 
-    def tell(self, text: str) -> None:
+    def tell(self, text):
         self.told.append(text)
 
-    def close(self, run: Any) -> None:
+    def close(self, run):
         self.ended = run.status
 
 
-def pose(k: int, **fields: Any) -> dict[str, Any]:
+def pose(k, **fields):
     x, y = place()
     return {"type": "pose", "entity": "ana", "x": x + 0.01 * k, "y": y, **fields}
 
 
-def bridged(messages: dict[int, list[Any]], **options: Any) -> tuple[Any, Now, Bridge]:
+def bridged(messages, **options) -> tuple[Any, Now, Bridge]:
     peer = Now(messages)
     out = options.pop("out", None)
     bridge = Bridge(fleet2d.Simulation(LIVE, out=out), [peer], speed=0, **options)
@@ -59,7 +59,7 @@ def bridged(messages: dict[int, list[Any]], **options: Any) -> tuple[Any, Now, B
 
 
 def test_ctrl_c_within_a_step_ends_the_run_after_it(monkeypatch):
-    def press(_: object, span: Any) -> None:
+    def press(_, span):
         if span.first == 3:
             signal.raise_signal(signal.SIGINT)
 
@@ -91,7 +91,7 @@ def test_a_recorded_live_run_gives_the_same_digest(tmp_path):
         "detections": [{"user": "ana", "x": x, "y": y}],
     }
     steer = {"type": "velocity", "entity": "astro", "forward": 0.2, "turn_deg": -20}
-    messages: dict[int, list[Any]] = {
+    messages = {
         0: [pose(0), seen, {"type": "reading", "sensor": "front_door", "on": True}],
         3: ["nonsense", pose(3), seen],
         7: [{"type": "goal", "entity": "astro", "to": list(place()), "heading_deg": 90}],
@@ -194,7 +194,7 @@ def test_a_flood_does_not_fill_the_memory():
 
 @pytest.mark.slow
 def test_a_body_stands_when_poses_stop_and_moves_when_they_arrive_again():
-    told: list[str] = []
+    told = []
 
     def messages() -> Iterator[dict[str, Any]]:
         yield pose(0)
@@ -238,7 +238,7 @@ def test_steps_begin_in_time():
 def test_a_function_may_intervene():
     simulation = fleet2d.Simulation(LIVE)
 
-    def send(frame: LiveStep) -> None:
+    def send(frame: LiveStep):
         if frame.step == 3:
             simulation.do({"send": "astro", "to": "kitchen_1"})
 
@@ -293,7 +293,7 @@ def test_clients_of_one_peer_count_their_own_messages():
 SOURCE = "udp://127.0.0.1:9"
 
 
-def sourced() -> dict[str, Any]:
+def sourced():
     astro = {
         "perceives": {"type": "live", "source": SOURCE},
         "behaviors": [{"type": "live", "source": SOURCE}],
@@ -337,7 +337,7 @@ def test_a_scenario_does_not_talk_to_other_machines_by_itself():
         open_peers(changed)
 
 
-def ordered(*messages: dict[str, Any]) -> tuple[list[Any], dict[str, int], list[str]]:
+def ordered(*messages) -> tuple[list[Any], dict[str, int], list[str]]:
     """Return what is done with messages that arrive in one step, what is counted, and told."""
     run, peer, bridge = bridged({3: list(messages)})
     acts = [(act["do"], act.get("to")) for act in run.manifest["interventions"]]
@@ -385,10 +385,10 @@ def test_a_message_that_is_refused_replaces_none(right, wrong):
 
 
 def test_a_goal_of_a_client_that_came_back_within_a_step_stays():
-    acts, counts, _ = ordered(GOAL, None, HALLWAY)  # type: ignore[arg-type]
+    acts, counts, _ = ordered(GOAL, None, HALLWAY)
     assert acts == [("send", "hallway_1")]
 
-    acts, counts, _ = ordered(GOAL, None)  # type: ignore[arg-type]
+    acts, counts, _ = ordered(GOAL, None)
     assert [act for act, _ in acts] == ["send", "release"]
     assert counts["withdrawn"] == 1
 
@@ -475,7 +475,7 @@ def test_an_iterator_that_fails_is_told_in_a_line(capfd):
         yield pose(0)
         raise ValueError("no more")
 
-    told: list[str] = []
+    told = []
     simulation = fleet2d.Simulation(LIVE)
     bridge = Bridge(simulation, [from_iterator(messages())], 20, tell=told.append)
     bridge.run()
@@ -487,7 +487,7 @@ def test_an_iterator_that_fails_is_told_in_a_line(capfd):
 
 FLOOD = [{"type": "reading", "sensor": "front_door", "on": bool(k % 2)} for k in range(5000)]
 AFAR = dict(zip("xy", place("bedroom_1"), strict=True))
-COUNTED: dict[str, tuple[dict[int, list[Any]], dict[str, int], list[str]]] = {
+COUNTED = {
     "lost and late by their numbers": (
         {k: [pose(k, number=n)] for k, n in enumerate([0, 1, 4, 3, 5])},
         {"received": 5, "applied": 4, "lost": 2, "late": 1},

@@ -3,7 +3,6 @@
 import json
 import socket
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from tests.live.scenes import LIVE, place
@@ -16,7 +15,7 @@ from fleet2d.live.peers import UdpPeer
 GOAL = {"type": "goal", "entity": "astro", "to": "kitchen_1", "id": "g1"}
 
 
-def told(messages: dict[int, list[Any]], **changes: Any) -> list[Any]:
+def told(messages, **changes):
     """Return what was told of goals, without repetitions, in a run with messages before steps."""
     peer = Now(messages)
     Bridge(fleet2d.Simulation({**LIVE, **changes}), [peer], speed=0).run()
@@ -24,7 +23,7 @@ def told(messages: dict[int, list[Any]], **changes: Any) -> list[Any]:
     return [s for i, s in enumerate(states) if i == 0 or s[:4] != states[i - 1][:4]]
 
 
-def names(states: list[Any]) -> list[tuple[str, str]]:
+def names(states) -> list[tuple[str, str]]:
     return [(state.id, str(state.state)) for state in states]
 
 
@@ -139,11 +138,11 @@ def test_who_sends_a_datagram_hears_what_becomes_of_its_goal():
         program.settimeout(5)
         simulation = fleet2d.Simulation(LIVE, "simulation.step=50 ms", "simulation.duration=2 s")
 
-        def send() -> None:
+        def send():
             program.sendto(json.dumps(GOAL).encode(), ("127.0.0.1", peer.port))
 
         first = Now({})
-        first.open = lambda *_: send()  # type: ignore[method-assign]
+        first.open = lambda *_: send()
         Bridge(simulation, [peer, first], speed=1).run()
         states = [json.loads(program.recv(1000))["state"] for _ in range(1)]
 

@@ -10,7 +10,7 @@ from fleet2d.live.library_errors import LIBRARIES, libraries_told
 
 @pytest.mark.parametrize("name", LIBRARIES)
 def test_an_error_of_a_library_is_one_line(name, capfd):
-    told: list[str] = []
+    told = []
     logger = logging.getLogger(f"{name}.server")
     with libraries_told(told.append):
         try:
@@ -26,10 +26,10 @@ def test_an_error_of_a_library_is_one_line(name, capfd):
 
 
 def test_a_thread_that_fails_is_one_line(capfd):
-    def fail() -> None:
+    def fail():
         raise RuntimeError("gone")
 
-    told: list[str] = []
+    told = []
     with libraries_told(told.append):
         thread = threading.Thread(target=fail)
         thread.start()

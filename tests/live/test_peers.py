@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def in_background(bridge: Bridge) -> tuple[threading.Thread, list[Any]]:
-    runs: list[Any] = []
+    runs = []
     thread = threading.Thread(target=lambda: runs.append(bridge.run()))
     thread.start()
     return thread, runs
@@ -31,7 +31,7 @@ def in_background(bridge: Bridge) -> tuple[threading.Thread, list[Any]]:
 
 @pytest.mark.slow
 def test_datagrams_move_a_body():
-    peer: Any = open_peer("udp://127.0.0.1:0")
+    peer = open_peer("udp://127.0.0.1:0")
     port, simulation = peer.port, fleet2d.Simulation(LIVE)  # it is closed when the run ends
     thread, runs = in_background(Bridge(simulation, [peer], speed=30))
     x, y = place()
@@ -82,11 +82,11 @@ def test_a_client_hears_all_and_sends_goals():
     pytest.importorskip("websockets", reason="the extra live is not installed")
     from websockets.sync.client import connect
 
-    peer: Any = open_peer("ws://127.0.0.1:0")
+    peer = open_peer("ws://127.0.0.1:0")
     simulation = fleet2d.Simulation(LIVE)
     bridge = Bridge(simulation, [peer], speed=30)
     thread, runs = in_background(bridge)
-    heard: list[Any] = []
+    heard = []
     with connect(f"ws://127.0.0.1:{peer.port}") as client:
         client.send(json.dumps({"type": "goal", "entity": "astro", "to": "kitchen_1"}))
         client.send("?")
@@ -108,7 +108,7 @@ def test_a_client_that_leaves_does_not_stop_the_run():
     pytest.importorskip("websockets", reason="the extra live is not installed")
     from websockets.sync.client import connect
 
-    peer: Any = open_peer("ws://127.0.0.1:0")
+    peer = open_peer("ws://127.0.0.1:0")
     thread, runs = in_background(Bridge(fleet2d.Simulation(LIVE), [peer], speed=30))
     with connect(f"ws://127.0.0.1:{peer.port}") as client:
         client.recv()
@@ -118,7 +118,7 @@ def test_a_client_that_leaves_does_not_stop_the_run():
     assert runs[0].status == "complete"
 
 
-def shaken(port: int) -> socket.socket:
+def shaken(port) -> socket.socket:
     """Return a client that never reads what it gets."""
     client = socket.create_connection(("127.0.0.1", port))
     client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
@@ -132,11 +132,11 @@ def shaken(port: int) -> socket.socket:
 def test_a_client_that_never_reads_is_disconnected_and_told(monkeypatch, capfd):
     pytest.importorskip("websockets", reason="the extra live is not installed")
     monkeypatch.setattr(peers, "MAX_QUEUE", 20)
-    peer: Any = open_peer("ws://127.0.0.1:0")
-    told: list[str] = []
+    peer = open_peer("ws://127.0.0.1:0")
+    told = []
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=60, tell=told.append)
     peer.open, own = lambda *a: (own(*a), clients.append(shaken(peer.port))), peer.open
-    clients: list[socket.socket] = []
+    clients = []
     port = peer.port  # it is closed when the run ends
     huge = {"type": "note", "text": "x" * 1_000_000}
     send = peer.send
@@ -153,7 +153,7 @@ def test_a_client_that_never_reads_is_disconnected_and_told(monkeypatch, capfd):
 @pytest.mark.slow
 def test_clients_that_speak_no_websocket_leave_no_traceback(capfd):
     pytest.importorskip("websockets", reason="the extra live is not installed")
-    peer: Any = open_peer("ws://127.0.0.1:0")
+    peer = open_peer("ws://127.0.0.1:0")
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=15)
     port = peer.port
     thread, runs = in_background(bridge)
@@ -175,12 +175,12 @@ def test_pages_of_other_sites_are_refused():
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
 
-    peer: Any = open_peer("ws://127.0.0.1:0")
+    peer = open_peer("ws://127.0.0.1:0")
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=15)
     thread, _ = in_background(bridge)
     address = f"ws://127.0.0.1:{peer.port}"
     for origin in ("https://example.com", "null", "http://localhost.example.com"):
-        with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin):  # type: ignore[arg-type]
+        with pytest.raises(InvalidStatus, match="403"), connect(address, origin=origin):
             pass
     thread.join()
 
@@ -193,7 +193,7 @@ def test_a_page_in_chromium_shows_a_run_and_sends_a_robot():
     pages = partial(SimpleHTTPRequestHandler, directory=str(EXAMPLES / "live"))
     with chromium() as browser, ThreadingHTTPServer(("127.0.0.1", 0), pages) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        peer: Any = open_peer("ws://127.0.0.1:0")
+        peer = open_peer("ws://127.0.0.1:0")
         page = browser.new_page()
         simulation = fleet2d.Simulation(LIVE, "simulation.duration=80 s")  # a page takes long
         thread, runs = in_background(Bridge(simulation, [peer], speed=10))
@@ -225,15 +225,15 @@ def test_a_program_without_fleet2d_decides_where_the_robot_goes(tmp_path):
         "robots": {"astro": {"behaviors": [{"type": "live"}]}},
         "simulation": {"duration": "2 min", "seed": 4, "start": "2026-01-05T12:00"},
     }
-    peer: Any = open_peer("ws://127.0.0.1:0")
+    peer = open_peer("ws://127.0.0.1:0")
     simulation = fleet2d.Simulation(content)
     thread, runs = in_background(Bridge(simulation, [peer], speed=40))
     # An interpreter that has this library alone, and neither Fleet2D nor its environment.
     (tmp_path / "websockets").symlink_to(Path(websockets.__file__).parent)
     alone = {"env": {"PYTHONPATH": str(tmp_path)}, "cwd": tmp_path, "timeout": 30, "check": False}
     python = [sys.executable, "-S"]
-    tried = subprocess.run([*python, "-c", "import fleet2d"], capture_output=True, **alone)  # type: ignore[call-overload]
-    program = subprocess.run(  # type: ignore[call-overload]
+    tried = subprocess.run([*python, "-c", "import fleet2d"], capture_output=True, **alone)
+    program = subprocess.run(
         [*python, str(EXAMPLES / "live/follow.py"), f"ws://127.0.0.1:{peer.port}"],
         capture_output=True,
         text=True,

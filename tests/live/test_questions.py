@@ -1,7 +1,6 @@
 """Questions in SQL: right answers, or an error that names what is there; and nothing else is read."""
 
 from datetime import datetime, timedelta
-from typing import Any
 
 import pyarrow as pa
 import pytest
@@ -37,7 +36,7 @@ def tables():
     return {"events": events, "layer.heat": pa.table({"cell": [1, 2], "heat": [0.5, float("nan")]})}
 
 
-def rows(tables: dict[str, pa.Table], query: str) -> list[list[Any]]:
+def rows(tables: dict[str, pa.Table], query):
     """Return the values of all rows of an answer."""
     return [list(row.values()) for row in answer(tables, query)["shown"]]
 

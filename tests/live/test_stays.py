@@ -19,7 +19,7 @@ def run() -> fleet2d.Run:
     )
 
 
-def rooms(who: str) -> list[str]:
+def rooms(who):
     """Return the room of each step."""
     path = run().path(who, timedelta(seconds=1))
     names = [room.name for room in run().plan.rooms]
@@ -47,8 +47,8 @@ def test_rooms_are_summed_as_step_by_step(who):
 
 def test_hours_are_shares_of_what_was_simulated_of_them():
     steps = rooms("cleo")
-    inside: Counter[int] = Counter()
-    passed: Counter[int] = Counter()
+    inside = Counter()
+    passed = Counter()
     for step, room in enumerate(steps):
         hour = run().clock.time(step).hour
         passed[hour] += 1
@@ -63,7 +63,7 @@ def test_hours_are_shares_of_what_was_simulated_of_them():
 @pytest.mark.parametrize("of", ["kitchen", "kitchen_1", "bedroom", "away"])
 def test_days_split_stays_at_midnight(of):
     names = {room.name for room in run().plan.rooms if of in (room.name, room.type)} or {of}
-    days: Counter[str] = Counter()
+    days = Counter()
     for step, room in enumerate(rooms("ana")):
         days[run().clock.time(step).date().isoformat()] += room in names
 
@@ -91,4 +91,4 @@ def test_activities_follow_each_other_to_the_end():
 )
 def test_a_wrong_question_is_told(arguments, message):
     with pytest.raises(InputError, match=message):
-        summary(run(), *arguments)  # type: ignore[arg-type]
+        summary(run(), *arguments)

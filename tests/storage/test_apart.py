@@ -51,12 +51,12 @@ def endless(folder: Path) -> Path:
     return path
 
 
-def child() -> int:
+def child():
     assert apart._child is not None
     return apart._child.pid
 
 
-def is_alive(pid: int) -> bool:
+def is_alive(pid):
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -64,7 +64,7 @@ def is_alive(pid: int) -> bool:
     return True
 
 
-def soon(condition: Callable[[], bool]) -> bool:
+def soon(condition: Callable[[], bool]):
     end = time.monotonic() + 20
     while not condition() and time.monotonic() < end:
         time.sleep(0.05)
@@ -114,7 +114,7 @@ def test_threads_share_a_child(tmp_path):
     assert 1 == len(set(plans))
 
 
-def _read_in_a_fork(path: Path, pids: "multiprocessing.Queue[int]") -> None:
+def _read_in_a_fork(path: Path, pids: "multiprocessing.Queue[int]"):
     load_floorplan(path)
     pids.put(child())
 
@@ -195,7 +195,7 @@ def test_time_is_limited(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_processor_time_ends_before_the_clock_does(tmp_path, monkeypatch):
-    ends: list[int] = []
+    ends = []
     death = apart._death
     monkeypatch.setattr(
         apart,
@@ -251,16 +251,16 @@ def test_ctrl_c_leaves_no_answer_for_the_next_file(tmp_path):
 FLAT = json.loads(apart._encode(FloorPlan.build("flat", shapely.box(0, 0, 2, 2))))
 
 
-def changed(**changes: object) -> bytes:
+def changed(**changes):
     """Return an answer that is a plan but for some fields."""
     return json.dumps({"value": FLAT | changes}).encode()
 
 
-def _short(content: bytes) -> str:
+def _short(content):
     return f"bytes({len(content)})" if content == bytes(len(content)) else repr(content)
 
 
-def answering(content: bytes, length: int | None = None) -> str:
+def answering(content, length: int | None = None):
     """Return the program of a child that has one answer."""
     head = (len(content) if length is None else length).to_bytes(8, "big")
     return (

@@ -11,7 +11,7 @@ from fleet2d.bounds import LEARNED_BYTES
 from fleet2d.storage.archives import read_arrays
 
 
-def packed(path: Path, method: int) -> Path:
+def packed(path: Path, method) -> Path:
     content = io.BytesIO()
     np.save(content, np.arange(3.0))
     with zipfile.ZipFile(path, "w", method) as archive:

@@ -88,7 +88,7 @@ def test_a_file_that_was_not_finished_leaves_the_old_one(tmp_path, error):
     file = tmp_path / "plan.json"
     file.write_text("old")
 
-    def fail() -> None:
+    def fail():
         with replacing(file) as handle:
             os.write(handle, b"ne")
             raise error("no more")
@@ -101,7 +101,7 @@ def test_a_file_that_was_not_finished_leaves_the_old_one(tmp_path, error):
 
 def test_a_file_is_on_the_disk_before_it_replaces_another(tmp_path, monkeypatch):
     """After a power cut, a name may else lead to a file without content."""
-    done: list[str] = []
+    done = []
     for name in ("write_all", "sync", "replace"):
         operation = getattr(files, name)
         monkeypatch.setattr(
@@ -144,7 +144,7 @@ def test_only_one_of_many_takes_the_lock(tmp_path):
 
 
 def test_a_folder_that_could_not_be_made_leaves_nothing(tmp_path):
-    def make() -> None:
+    def make():
         with new_folder(tmp_path / "bag") as made:
             made.mkdir()
             (made / "half").touch()

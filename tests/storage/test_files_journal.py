@@ -1,7 +1,6 @@
 """Journals: complete frames are read, whatever follows them."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,7 +11,7 @@ from fleet2d.storage.files import FrameWriter, JournalFormat, read_frames
 NOTES = JournalFormat(b"notes 1\n", ("note", "end"))
 
 
-def written(path: Path, texts: list[str]) -> FrameWriter:
+def written(path: Path, texts) -> FrameWriter:
     writer = FrameWriter(path, NOTES)
     for text in texts:
         writer.add("note", f'"{text}"', text.encode() * 3)
@@ -20,7 +19,7 @@ def written(path: Path, texts: list[str]) -> FrameWriter:
     return writer
 
 
-def texts_of(path: Path, start: int = 0) -> list[str]:
+def texts_of(path: Path, start=0):
     return [frame.description for frame in read_frames(path, NOTES, start)]
 
 
@@ -61,7 +60,7 @@ def test_a_failed_write_is_undone(tmp_path, monkeypatch):
     writer = written(tmp_path / "journal", ["one"])
     write_all = files.write_all
 
-    def half(handle: int, content: Any) -> None:
+    def half(handle, content):
         write_all(handle, content[: len(content) // 2])
         raise OSError(28, "No space left on device")
 

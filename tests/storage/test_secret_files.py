@@ -3,7 +3,6 @@
 import os
 import stat
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from subprocess import PIPE, Popen
 
@@ -61,17 +60,17 @@ def test_a_secret_that_another_process_has_just_made_is_taken(key, monkeypatch):
     assert [key] == list(key.parent.iterdir())
 
 
-def as_link(key: Path) -> None:
+def as_link(key: Path):
     key.rename(key.with_name("other"))
     key.symlink_to("other")
 
 
-def as_pipe(key: Path) -> None:
+def as_pipe(key: Path):
     key.unlink()
     os.mkfifo(key, 0o600)
 
 
-DAMAGES: dict[str, Callable[[Path], object]] = {
+DAMAGES = {
     "is a link": as_link,
     "is not a file": as_pipe,
     "may be read by others (mode 0644)": lambda key: key.chmod(0o644),

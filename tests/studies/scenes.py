@@ -17,7 +17,7 @@ from fleet2d.studies.reader import Study, open_study
 SPEED = "robots.astro.speed"
 
 
-def base(duration: str = "2 min", **sections: Any) -> dict[str, Any]:
+def base(duration="2 min", **sections):
     """A scenario of a person who meanders and a robot that patrols."""
     robots = {"astro": {"type": "patrol", "camera": {"range": [0, 4]}}}
     return scenario(
@@ -29,7 +29,7 @@ def base(duration: str = "2 min", **sections: Any) -> dict[str, Any]:
     )
 
 
-def small(**keys: Any) -> dict[str, Any]:
+def small(**keys):
     """A study of two speeds with three seeds, or what the keys say."""
     return {"base": base(), "axes": {SPEED: [0.3, 0.6]}, "replicates": 3, **keys}
 
@@ -41,24 +41,24 @@ class CountingExecutor(SerialExecutor):
         tasks: The tasks that it ran.
     """
 
-    def __init__(self, most: int = 1000) -> None:
+    def __init__(self, most=1000):
         self.most = most
         self.tasks: list[Any] = []
 
-    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+    def submit(self, function, /, *args, **kwargs) -> Future[Any]:
         if len(self.tasks) == self.most:
             raise KeyboardInterrupt
         self.tasks.append(args[1][0])
         return super().submit(function, *args, **kwargs)
 
     @property
-    def ran(self) -> list[int]:
+    def ran(self):
         """The numbers of the tasks that it ran."""
         return [task.number for task in self.tasks]
 
 
 def run(
-    study: Any, folder: Path, executor: Executor | None = None, workers: int = 1, **options: Any
+    study, folder: Path, executor: Executor | None = None, workers=1, **options
 ) -> tuple[Counts, Study]:
     """Run a study in this process, one variant at a time, and open it."""
     crew = Crew(executor or SerialExecutor(), workers, batch_s=0.0)
@@ -67,12 +67,12 @@ def run(
     return counts, open_study(folder)
 
 
-def digests(study: Study) -> list[str]:
+def digests(study: Study):
     """The digests of all variants, in order."""
     return study.variants["digest"].to_list()
 
 
-def optional(name: str) -> Any:
+def optional(name):
     """Return a module that only the extra `cluster` installs; skip what needs it elsewhere."""
     if os.environ.get("FLEET2D_REQUIRE_CLUSTER") == "1":
         return importlib.import_module(name)

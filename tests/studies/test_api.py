@@ -19,22 +19,22 @@ from fleet2d.studies.api import default_location, map_runs
 SEEDED = [base("1 min", simulation={"seed": seed}) for seed in range(4)]
 
 
-def digest_of(run: Run) -> str:
+def digest_of(run: Run):
     assert run.digest is not None
     return run.digest
 
 
-def seed_of(run: Run) -> int:
+def seed_of(run: Run):
     return int(run.manifest["seed"])
 
 
-def fail_on_seed_two(run: Run) -> int:
+def fail_on_seed_two(run: Run):
     if run.manifest["seed"] == 2:
         raise ValueError("two")
     return int(run.manifest["seed"])
 
 
-def end_the_process(run: Run) -> None:
+def end_the_process(run: Run):
     os._exit(3)
 
 
@@ -66,13 +66,13 @@ class Reads:
 
     count: ClassVar[int] = 0
 
-    def __setstate__(self, state: object) -> None:
+    def __setstate__(self, state):
         Reads.count += 1
 
-    def __getstate__(self) -> str:
+    def __getstate__(self):
         return "anything"
 
-    def __call__(self, run: Run) -> int:
+    def __call__(self, run: Run):
         return Reads.count
 
 
@@ -91,7 +91,7 @@ def test_a_lambda_can_be_mapped():
 @pytest.mark.parametrize("executor", ["local", "serial"])
 def test_what_a_function_raises_is_raised_with_its_scenario(executor):
     with pytest.raises(ValueError, match="two") as caught:
-        map_runs(fail_on_seed_two, SEEDED, workers=1, executor=executor)  # type: ignore[arg-type]
+        map_runs(fail_on_seed_two, SEEDED, workers=1, executor=executor)
     assert ["in scenario 2"] == caught.value.__notes__
 
 
@@ -125,7 +125,7 @@ def test_the_process_pool_of_python_runs_scenarios():
 
 def test_an_unknown_executor_is_refused():
     with pytest.raises(InputError, match="give local or serial"):
-        map_runs(seed_of, SEEDED, executor="cloud")  # type: ignore[arg-type]
+        map_runs(seed_of, SEEDED, executor="cloud")
 
 
 def test_a_study_is_stored_by_its_name():
@@ -136,7 +136,7 @@ def test_runs_in_one_home_follow_each_other_and_results_keep_their_order():
     noting = CountingExecutor()
     homes = [{"type": "synthetic", "seed": home} for home in (1, 2, 1, 2)]
     scenarios = [{**one, "floorplan": home} for one, home in zip(SEEDED, homes, strict=True)]
-    order: list[int] = []
+    order = []
     results = map_runs(seed_of, scenarios, workers=1, executor=noting, on_result=order.append)
     assert [0, 1, 2, 3] == results
     assert [0, 2, 1, 3] == order

@@ -1,7 +1,6 @@
 """Axes: what they offer, how it is labelled, and how they refuse."""
 
 import json
-from typing import Any
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
@@ -13,15 +12,15 @@ from fleet2d.studies.axes import KINDS, AnyAxis, Axis, Parameter
 SPEED = "robots.astro.speed"
 
 
-def axis(**keys: Any) -> Axis:
+def axis(**keys) -> Axis:
     return TypeAdapter(AnyAxis).validate_python(keys)
 
 
-def labels(x_axis: Axis, name: str = "x") -> list[Any]:
+def labels(x_axis: Axis, name="x"):
     return [tuple(choice.labels.values()) for choice in x_axis.choices(name)]
 
 
-def values(x_axis: Axis, name: str = "x") -> list[Any]:
+def values(x_axis: Axis, name="x"):
     return [choice.changes[0][1] for choice in x_axis.choices(name)]
 
 
@@ -105,7 +104,7 @@ def test_a_latin_hypercube_fills_every_eighth_of_a_range_once():
     assert list(range(8)) == sorted(int(speed) for (speed,) in labels(x_axis))
 
 
-def points(method: str, count: int, dimensions: int = 2) -> list[tuple[int, ...]]:
+def points(method, count, dimensions=2) -> list[tuple[int, ...]]:
     """Return samples of parameters from 0 to 1000, as whole numbers."""
     parameters = {
         f"p{i}": {"key": f"robots.astro.p{i}", "low": 0, "high": 1000} for i in range(dimensions)

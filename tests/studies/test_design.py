@@ -1,7 +1,6 @@
 """Designs: which variants there are, what their scenarios are, and what errors name."""
 
 import time
-from typing import Any
 
 import pytest
 from tests.studies.scenes import SPEED, base, small
@@ -13,11 +12,11 @@ from fleet2d.studies.specification import read_specification
 RADIUS = "robots.astro.radius"
 
 
-def design(**keys: Any) -> Design:
+def design(**keys) -> Design:
     return build_design(read_specification(small(**keys)))
 
 
-def labels(study_design: Design, *columns: str) -> list[tuple[Any, ...]]:
+def labels(study_design: Design, *columns):
     return [tuple(study_design.parameters(i)[c] for c in columns) for i in range(len(study_design))]
 
 
@@ -43,7 +42,7 @@ def test_tables_that_are_not_kept_are_not_made():
     assert (60.0, True) == (
         kept_artifacts.trajectories.total_seconds(),
         kept_artifacts.observations,
-    )  # type: ignore[union-attr]
+    )
 
 
 def test_an_axis_with_a_condition_applies_there_only():

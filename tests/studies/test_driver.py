@@ -32,10 +32,10 @@ class Fails(Algorithm):
 
 
 class CollectingObserver(driver.Observer):
-    def __init__(self) -> None:
+    def __init__(self):
         self.notes: list[str] = []
 
-    def on_note(self, text: str) -> None:
+    def on_note(self, text):
         self.notes.append(text)
 
 
@@ -231,7 +231,7 @@ def test_wrong_input_leaves_nothing_behind(tmp_path):
 
 def test_two_processes_can_not_run_the_same_study(tmp_path):
     class Nested(SerialExecutor):
-        def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        def submit(self, function, /, *args, **kwargs) -> Future[Any]:
             with pytest.raises(RunDirectoryError, match="is being written by process"):
                 run(small(), tmp_path / "study")
             return super().submit(function, *args, **kwargs)
@@ -268,7 +268,7 @@ def test_with_fail_fast_the_first_failure_ends_the_study(failing, tmp_path):
 
 def test_a_file_that_changes_during_a_study_fails_its_variants(failing, tmp_path):
     class Meddling(SerialExecutor):
-        def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        def submit(self, function, /, *args, **kwargs) -> Future[Any]:
             with (tmp_path / "broken.py").open("a") as file:
                 file.write("# changed\n")
             return super().submit(function, *args, **kwargs)

@@ -30,16 +30,16 @@ LARGE = small(axes={SPEED: [0.3, 0.4, 0.5, 0.6]}, replicates=SEEDS, keep={"table
 class Dies(Observer):
     """Kills its own process after some variants."""
 
-    def __init__(self, variants: int) -> None:
+    def __init__(self, variants):
         self.remaining = variants
 
-    def on_result(self, result: VariantResult) -> None:
+    def on_result(self, result: VariantResult):
         self.remaining -= 1
         if not self.remaining:
             os.kill(os.getpid(), signal.SIGKILL)
 
 
-def run_in_a_child_and_kill(folder: Path, after_s: float, variants: int) -> None:
+def run_in_a_child_and_kill(folder: Path, after_s, variants):
     """Run a study in a copy of this process, and kill it after a time or some variants."""
     child = os.fork()
     if not child:
@@ -82,7 +82,7 @@ def test_a_study_killed_many_times_ends_as_an_undisturbed_one(tmp_path):
     assert undisturbed.variants.select(columns).equals(study.variants.select(columns))
 
 
-def start(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
+def start(folder: Path, *arguments) -> "subprocess.Popen[bytes]":
     """Begin the command in a process group of its own."""
     (folder / "study.yaml").write_text(yaml.safe_dump(small(base=base("1 h"), replicates=40)))
     return subprocess.Popen(
@@ -94,14 +94,14 @@ def start(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
     )
 
 
-def workers_of(process: "subprocess.Popen[bytes]") -> list[int]:
+def workers_of(process: "subprocess.Popen[bytes]"):
     files = Path(f"/proc/{process.pid}/task").glob("*/children")  # a thread starts each
     pids = [pid for file in files for pid in file.read_text().split()]
     commands = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in pids}
     return [pid for pid, command in commands.items() if b"spawn_main" in command]
 
 
-def is_running(pid: int) -> bool:
+def is_running(pid):
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
     except OSError:
@@ -109,7 +109,7 @@ def is_running(pid: int) -> bool:
     return state != "Z"
 
 
-def wait_for_results(folder: Path, process: "subprocess.Popen[bytes]") -> None:
+def wait_for_results(folder: Path, process: "subprocess.Popen[bytes]"):
     results = folder / "studies/study/results/000001.parquet"
     deadline = time.monotonic() + 120
     while not results.exists():

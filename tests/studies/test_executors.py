@@ -30,18 +30,18 @@ from fleet2d.studies.executors import (
 )
 
 
-def queue(homes: str) -> TaskQueue:
+def queue(homes) -> TaskQueue:
     return TaskQueue(by_home(WorkerTask(i, i, "", home) for i, home in enumerate(homes)))
 
 
-def homes_of(tasks: TaskQueue, workers: int) -> list[str]:
+def homes_of(tasks: TaskQueue, workers):
     calls = []
     while tasks:
         calls.append("".join(task.home for task in tasks.take(workers)))
     return calls
 
 
-def ends_of(crew: Crew, job: Any, homes: str) -> list[TaskEnd]:
+def ends_of(crew: Crew, job, homes) -> list[TaskEnd]:
     with crew.executor:
         return list(itertools.chain.from_iterable(run_tasks(crew, job, queue(homes))))
 
@@ -59,7 +59,7 @@ def test_a_worker_gets_the_tasks_of_a_home_together(homes, calls):
 
 
 def test_tasks_are_made_when_they_are_taken():
-    made: list[int] = []
+    made = []
     group = (made.append(i) or WorkerTask(i, i, "") for i in range(300))
     TaskQueue([(300, group)]).take(1)
     assert list(range(MAX_BATCH)) == made
@@ -96,7 +96,7 @@ def test_a_task_that_fails_each_time_is_lost_and_the_others_are_not():
 
 def test_a_broken_executor_is_told():
     class Broken(SerialExecutor):
-        def submit(self, *args: Any, **kwargs: Any) -> Any:
+        def submit(self, *args, **kwargs):
             raise BrokenExecutor("a process died")
 
     with pytest.raises(ComponentError, match=r"broken: a process died; with a new one the same"):
@@ -106,20 +106,20 @@ def test_a_broken_executor_is_told():
 class SerialAsElsewhere(SerialExecutor):
     """Puts errors into futures, as other executors do."""
 
-    def submit(self, function: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+    def submit(self, function, /, *args, **kwargs) -> Future[Any]:
         try:
             return super().submit(function, *args, **kwargs)
         except ValueError as error:
-            future: Future[Any] = Future()
+            future = Future()
             future.set_exception(error)
             return future
 
 
-def collects_after(task: WorkerTask) -> int:
+def collects_after(task: WorkerTask):
     return gc.get_threshold()[0]
 
 
-def new_pages_of_an_array(task: WorkerTask) -> int:
+def new_pages_of_an_array(task: WorkerTask):
     import resource
 
     faults = [
@@ -147,11 +147,11 @@ def test_workers_keep_the_memory_of_freed_arrays_for_the_next_ones():
     assert end.payload < 500
 
 
-def number_of(task: WorkerTask) -> int:
+def number_of(task: WorkerTask):
     return task.number
 
 
-def fails_at_1(task: WorkerTask) -> int:
+def fails_at_1(task: WorkerTask):
     if task.number == 1:
         raise ValueError("number 1")
     return task.number
@@ -163,17 +163,17 @@ def fails_at_1(task: WorkerTask) -> int:
 class DiesWhileSending:
     """A job whose first call ends its process in the middle of its results."""
 
-    def __init__(self, mark: Path) -> None:
+    def __init__(self, mark: Path):
         self.mark = mark
 
-    def __call__(self, task: WorkerTask) -> bytes:
+    def __call__(self, task: WorkerTask):
         if not self.mark.exists():
             self.mark.touch()
-            Connection._send = _send_some_and_die  # type: ignore[attr-defined]
+            Connection._send = _send_some_and_die
         return bytes(1_000_000)
 
 
-def _send_some_and_die(connection: Any, content: bytes, write: Any = None) -> None:
+def _send_some_and_die(connection, content, write=None):
     os.write(connection.fileno(), content[:1000])
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -181,7 +181,7 @@ def _send_some_and_die(connection: Any, content: bytes, write: Any = None) -> No
 class CannotBeLoaded:
     """A job that raises an error where it is loaded."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self):
         return int, ("no job",)
 
 
@@ -195,7 +195,7 @@ def test_a_worker_killed_while_it_sends_its_results_is_replaced(tmp_path):
 
 
 def test_a_job_that_no_worker_can_load_is_an_error_with_its_traceback():
-    job: Any = CannotBeLoaded()
+    job = CannotBeLoaded()
     with pytest.raises(InputError, match=r"can't be set up(.|\n)*'no job'"):
         ends_of(Crew(LocalExecutor(1)), job, "a")
 
@@ -216,5 +216,5 @@ def test_memory_is_shared_among_processes_that_there_are(monkeypatch):
     assert 1 == len({end.payload for end in ends})
 
 
-def pid_of(task: WorkerTask) -> int:
+def pid_of(task: WorkerTask):
     return os.getpid()

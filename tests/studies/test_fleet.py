@@ -1,7 +1,6 @@
 """Fleets: percentiles with intervals that hold, the worst robots, and groups found and tested."""
 
 import re
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -14,7 +13,7 @@ from fleet2d.studies.fleet import find_groups, quantile_ranks
 from fleet2d.studies.report import write_report
 
 
-def features(generator: np.random.Generator, count: int) -> dict[str, Any]:
+def features(generator: np.random.Generator, count):
     """Features as fleets have them: numbers and texts, some of them missing."""
     people = generator.integers(1, 5, count).tolist()
     area = generator.uniform(30, 250, count).tolist()

@@ -4,7 +4,6 @@ import math
 import runpy
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from tests.thorough import some
 
 from fleet2d.studies.intervals import ENOUGH_UNITS, MeanEstimate, estimate, student_quantile
 
-BENCHMARK: Any = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "intervals.py"))
+BENCHMARK = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "intervals.py"))
 
 STUDIES = 400
 
@@ -30,7 +29,7 @@ def test_levels_with_a_single_unit_do_not_count():
     assert one_level == estimate([1.0, 2.0, 4.0], {"home": ["a"] * 3, "seed": [0, 1, 2]})
 
 
-def study_of(homes: int, effect: float) -> MeanEstimate:
+def study_of(homes, effect) -> MeanEstimate:
     generator = np.random.default_rng(3)
     of_home, seeds = generator.normal(effect, 1, homes), 4
     values = np.repeat(of_home, seeds) + generator.normal(0, 0.5, homes * seeds)

@@ -1,7 +1,5 @@
 """A pilot tells before a study what one of its size can tell."""
 
-from typing import Any
-
 import polars as pl
 import pytest
 from tests.studies.scenes import SPEED, base, small
@@ -13,7 +11,7 @@ from fleet2d.studies.pilot import Pilot
 ASKED = [{"metric": "distance.astro", "against": {SPEED: 0.6}}]
 
 
-def pilot(**keys: Any) -> Pilot:
+def pilot(**keys) -> Pilot:
     return Pilot(check_study(small(compare=ASKED, **keys)))
 
 

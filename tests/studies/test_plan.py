@@ -2,7 +2,6 @@
 
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.studies.scenes import SPEED, base, run, small
@@ -25,12 +24,12 @@ ROOT = Path(__file__).parents[2]
 ATTIC = {"key": "users.ana.start", "values": ["kitchen", "attic", "kitchn"]}
 
 
-def plan(**keys: Any) -> StudyPlan:
+def plan(**keys) -> StudyPlan:
     specification = read_specification(small(**keys))
     return make_plan(build_design(specification))
 
 
-def identities(**keys: Any) -> list[str]:
+def identities(**keys):
     return plan(**keys).variants["identity"].to_list()
 
 
@@ -189,10 +188,10 @@ def test_a_seed_of_a_rule_is_refused():
 
 
 def test_variants_without_a_metric_are_noted(tmp_path):
-    notes: list[str] = []
+    notes = []
 
     class Notes(Observer):
-        def on_note(self, text: str) -> None:
+        def on_note(self, text):
             notes.append(text)
 
     rules = [{"when": {SPEED: 0.6}, "set": {"metrics.sightings": None}}]

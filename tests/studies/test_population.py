@@ -4,7 +4,6 @@ out."""
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.scenes import flat_document
@@ -25,21 +24,21 @@ SYNTHETIC = [{"synthetic": 100}]
 COUPLE = {"members": {"ana": "retired", "ben": "retired"}, "couples": [["ana", "ben"]]}
 
 
-def fleet(count: int = 3, **keys: Any) -> dict[str, Any]:
+def fleet(count=3, **keys):
     """A study of a fleet in small synthetic homes."""
     keys = {"homes": SYNTHETIC, "households": [["retired"], ["student", "student"]], **keys}
     return {"base": BASE, "axes": {"robot": {"population": count, **keys}}}
 
 
-def design(**keys: Any) -> Design:
+def design(**keys) -> Design:
     return build_design(read_specification(fleet(**keys)))
 
 
-def draw(**keys: Any) -> Draw:
+def draw(**keys) -> Draw:
     return Draw(DrawSettings(**{"homes": SYNTHETIC, **keys}), {}, 0, "population")
 
 
-def table(folder: Path, text: str) -> str:
+def table(folder: Path, text):
     path = folder / "census.csv"
     path.write_text(text)
     return str(path)
@@ -47,7 +46,7 @@ def table(folder: Path, text: str) -> str:
 
 def test_a_life_is_drawn_once_for_its_scenario(monkeypatch):
     lives = design()
-    drawn: list[int] = []
+    drawn = []
     draw_life = Draw.life
     monkeypatch.setattr(Draw, "life", lambda self, n: drawn.append(n) or draw_life(self, n))
 
@@ -234,7 +233,7 @@ def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(m
     """A fleet of 2,000 was refused, as for two of its homes no layout was found."""
     built = iter(range(100))
 
-    def facts_of(*_: Any) -> HomeFeatures:
+    def facts_of(*_) -> HomeFeatures:
         if next(built) in {0, 2}:
             raise NoLayoutError("no synthetic home was found")
         return HomeFeatures(7, 3, 120.0, frozenset({"bedroom"}))
@@ -246,7 +245,7 @@ def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(m
 
 
 def test_a_fleet_of_which_no_home_has_a_layout_is_refused_with_the_reason(monkeypatch):
-    def facts_of(*_: Any) -> HomeFeatures:
+    def facts_of(*_) -> HomeFeatures:
         raise NoLayoutError("no synthetic home was found: ask for more or less area")
 
     monkeypatch.setattr(population, "facts_of", facts_of)

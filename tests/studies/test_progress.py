@@ -1,7 +1,5 @@
 """The bar of a study: how many variants, how fast, and how many failed."""
 
-from typing import Any
-
 from rich.progress import Progress
 
 from fleet2d.studies import progress
@@ -16,7 +14,7 @@ def test_a_bar_counts_what_is_complete_and_names_rate_and_failures(monkeypatch):
     bar = Progress(disable=True)
     observer = BarObserver(bar)
     observer.on_start(Counts(10, 4, 0), workers=2)
-    statuses: list[Any] = ["complete", "failed"]
+    statuses = ["complete", "failed"]
     for status in statuses:
         now_s += 10.0
         observer.on_result(VariantResult({"status": status}))

@@ -3,7 +3,6 @@
 import importlib
 import os
 import sys
-from typing import Any
 
 import pytest
 from tests.studies.scenes import base, digests, optional, run, small
@@ -36,10 +35,10 @@ def cluster():
 class KillsANode(Observer):
     """Kills a node of a cluster while workers on both nodes are at work."""
 
-    def __init__(self, cluster: Any) -> None:
+    def __init__(self, cluster):
         self.cluster, self.has_killed = cluster, False
 
-    def on_result(self, result: VariantResult) -> None:
+    def on_result(self, result: VariantResult):
         if not self.has_killed:
             self.has_killed = True
             self.cluster.remove_node(self.cluster.nodes_to_kill[0], allow_graceful=False)

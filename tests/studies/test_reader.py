@@ -5,7 +5,6 @@ import math
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import duckdb
 import polars as pl
@@ -73,11 +72,11 @@ def test_a_table_of_all_variants_comes_with_their_parameters(study):
 def test_rows_are_those_of_the_run_itself(study):
     run = study.rerun(2)
     expected = run.polars("room_share").with_columns(pl.col(pl.Categorical).cast(pl.String))
-    rows = pl.from_arrow(pa_rows(study, 2)).drop("variant")  # type: ignore[union-attr]
+    rows = pl.from_arrow(pa_rows(study, 2)).drop("variant")
     assert expected.rows() == rows.rows()
 
 
-def pa_rows(study: Study, variant: int):  # type: ignore[no-untyped-def]
+def pa_rows(study: Study, variant):
     import pyarrow.compute as pc
 
     return study.arrow("room_share").to_table(filter=pc.field("variant") == variant)
@@ -118,7 +117,7 @@ def test_what_numbers_can_be_and_which_are_better_is_known(study):
 
 
 def test_a_study_whose_variants_all_failed_has_no_answers(tmp_path, monkeypatch):
-    def fails(*_: Any) -> None:
+    def fails(*_):
         raise ComponentError("no more memory")
 
     monkeypatch.setattr(Sightings, "update", fails)

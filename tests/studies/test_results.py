@@ -1,7 +1,6 @@
 """Results in Parquet files: what is written, how it grows, and what comes back."""
 
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -23,7 +22,7 @@ from fleet2d.studies.storage import Storage
 FILE = "results/000001.parquet"
 
 
-def result(number: int, status: Any = "complete", rows: Any = None, **metrics: Any) -> Any:
+def result(number, status="complete", rows=None, **metrics):
     tables = {"rows": pa.table(rows or {"step": [1, 2], "value": [0.5, number]})}
     outcome = VariantOutcome(status, "d" * 8, metrics or {"a": 0.25}, tables, {"total": 1.0})
     return result_of(WorkerTask(number, number, f"id{number}"), outcome)
@@ -34,7 +33,7 @@ def storage(tmp_path):
     return Storage(tmp_path)
 
 
-def write(storage: Storage, *found: VariantResult) -> None:
+def write(storage: Storage, *found: VariantResult):
     writer = ResultWriter(storage)
     for each in found:
         writer.add(each)

@@ -22,7 +22,7 @@ SLOWER = {"configure": "astro", "behavior": "hangout", "keys": {"tau": "5 min"}}
 STAGES = {"2026-01-06": "30 %", "2026-01-07": "all"}
 
 
-def rollout(count: int = 6, days: int = 4, **keys: Any) -> dict[str, Any]:
+def rollout(count=6, days=4, **keys):
     """A study of a rollout."""
     study = fleet(count, households=[["retired"]])
     simulation = {"start": "2026-01-05", "duration": f"{days} d"}
@@ -105,7 +105,7 @@ def test_numbers_of_each_day_end_as_the_run_ends_and_change_nothing():
     assert plain.metrics["distance.astro"] == rows[-1]["value"]
 
 
-def world(robots: int, effect: float) -> tuple[Any, Any, Any]:
+def world(robots, effect) -> tuple[Any, Any, Any]:
     """Numbers of robots whose days differ, and that change by an effect on half of them."""
     generator = np.random.default_rng(3)
     without = generator.normal(10, 1, (robots, 1)) + generator.normal(0, 0.5, (robots, 8))

@@ -3,8 +3,6 @@
 import json
 import math
 import re
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -39,7 +37,7 @@ class MadeUp(StudyAnswers):
     )
     comparisons = (PairedComparison(metric="score", against={METHOD: "old"}),)
 
-    def __init__(self, frame: pl.DataFrame) -> None:
+    def __init__(self, frame: pl.DataFrame):
         self.frame = frame
 
     @property
@@ -51,7 +49,7 @@ class MadeUp(StudyAnswers):
         return StudyAnswer(self).answer()
 
 
-def made_up(scores: Mapping[str, Any], status: str = "complete") -> MadeUp:
+def made_up(scores, status="complete") -> MadeUp:
     """Return a study with scores (homes, seeds) of each method; None: it has no such number."""
     return MadeUp(
         pl.DataFrame(
@@ -68,12 +66,12 @@ def made_up(scores: Mapping[str, Any], status: str = "complete") -> MadeUp:
     )  # fmt: skip
 
 
-def of_homes(**scores: Any) -> MadeUp:
+def of_homes(**scores) -> MadeUp:
     """Return a study with a score of each method for each home, and one seed."""
     return made_up({method: [[score] for score in homes] for method, homes in scores.items()})
 
 
-def drawn(shape: str, homes: int, effect: float, chance: int = 0) -> MadeUp:
+def drawn(shape, homes, effect, chance=0) -> MadeUp:
     """Return a study of homes of a shape, with a method that is better by an effect."""
     generator = np.random.default_rng((chance, homes))
     draw = SHAPES[shape]
@@ -81,7 +79,7 @@ def drawn(shape: str, homes: int, effect: float, chance: int = 0) -> MadeUp:
     return of_homes(old=old, new=new + effect * np.std(draw(generator, 10_000)))
 
 
-SHAPES: dict[str, Any] = {
+SHAPES = {
     "normal": lambda g, n: g.normal(3, 1, n),
     "lognormal": lambda g, n: np.exp(g.normal(0, 1, n)),
     "70 % are zero": lambda g, n: (g.random(n) < 0.3) * g.exponential(1, n),
@@ -92,7 +90,7 @@ SHAPES: dict[str, Any] = {
 DIFFERENCES = [0.1 * n - 0.9 + (3.0 if n == 4 else 0) for n in range(19)]
 NOISE = np.random.default_rng(4).normal(0, 1, 30)
 NOISE = (NOISE - NOISE.mean()) / NOISE.std(ddof=1)
-ODD: dict[str, tuple[MadeUp, str]] = {
+ODD = {
     "all failed": (
         made_up({"old": [[1]], "new": [[2]]}, "failed"),
         "of 2 variants 2 failed, most often because: no battery",
@@ -185,7 +183,7 @@ def test_a_value_that_failed_everywhere_is_named_without_being_asked_for(tmp_pat
 
 
 def test_a_study_that_goes_on_with_another_fleet_answers_for_that_one(tmp_path):
-    def fleet(*radii: float) -> dict[str, Any]:
+    def fleet(*radii):
         options = {f"home {r}": {"users.ana.radius": r} for r in radii}
         axes = {SPEED: [0.3, 0.6], HOME: {"options": options, "population": True}}
         compare = [{"metric": "distance.astro", "against": {SPEED: 0.3}}]

@@ -10,7 +10,7 @@ from fleet2d.scenario.load import load_scenario
 from fleet2d.studies.specification import Specification, read_specification
 
 
-def read_text(text: str, folder: Path) -> Specification:
+def read_text(text, folder: Path) -> Specification:
     file = folder / "study.yaml"
     file.write_text(text)
     return read_specification(file)

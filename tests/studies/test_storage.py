@@ -2,7 +2,6 @@
 
 import shutil
 from collections.abc import Iterator
-from typing import Any
 
 import polars as pl
 import pyarrow as pa
@@ -44,7 +43,7 @@ def location(server, tmp_path, monkeypatch):
 
 def test_a_study_on_s3_is_the_same_as_in_a_folder(location, tmp_path):
     _, local = run(ROWS, tmp_path / "study")
-    counts, remote = run(ROWS, location)  # type: ignore[arg-type]
+    counts, remote = run(ROWS, location)
     assert 6 == counts.complete
     assert digests(local) == digests(remote)
     assert local.arrow("room_share").to_table() == remote.arrow("room_share").to_table()
@@ -55,24 +54,24 @@ def test_a_study_on_s3_is_the_same_as_in_a_folder(location, tmp_path):
 
 def test_a_study_on_s3_goes_on_where_it_was_interrupted(location, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
+        run(ROWS, location, CountingExecutor(2))
     assert 2 == open_study(location).counts.complete
-    _, remote = run(ROWS, location)  # type: ignore[arg-type]
+    _, remote = run(ROWS, location)
     _, local = run(ROWS, tmp_path / "study")
     assert digests(local) == digests(remote)
 
 
 def test_what_is_on_s3_is_there_for_another_machine(location, tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        run(ROWS, location, CountingExecutor(2))  # type: ignore[arg-type]
+        run(ROWS, location, CountingExecutor(2))
     shutil.rmtree(tmp_path / "cache")
     assert 2 == open_study(location).counts.complete
 
 
 def test_a_part_that_is_cut_on_s3_is_run_again(location):
-    run(ROWS, location)  # type: ignore[arg-type]
+    run(ROWS, location)
     Storage(location).write("results/000001.parquet", b"PAR1")
-    counts, _ = run(ROWS, location)  # type: ignore[arg-type]
+    counts, _ = run(ROWS, location)
     assert 6 == counts.complete
 
 
@@ -90,7 +89,7 @@ def test_secrets_in_a_location_are_not_printed():
 def test_a_server_that_does_not_answer_is_told(monkeypatch):
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
     gone = "s3://key:secret@bucket/study?endpoint_override=127.0.0.1:9&scheme=http&region=a"
-    options: Any = "&request_timeout=1&connect_timeout=1"
+    options = "&request_timeout=1&connect_timeout=1"
     try:
         directory = StudyDirectory(gone + options)
     except RunDirectoryError:  # some versions know no such options

@@ -1,7 +1,6 @@
 """Tuning: what is searched, on what, that it goes on where it stopped, and how it is judged."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.studies.scenes import SPEED, CountingExecutor, base, small
@@ -33,7 +32,7 @@ RADIUS = "robots.astro.radius"
 PATROL = {"astro": {"type": "patrol", "dwell": 0, "speed": 0.2}}
 
 
-def search(**keys: Any) -> dict[str, Any]:
+def search(**keys):
     settings = {
         "search": {"speed": {"key": SPEED, "low": 0.2, "high": 1.0}},
         "objective": {"distance.astro": "maximize"},
@@ -50,15 +49,13 @@ def search(**keys: Any) -> dict[str, Any]:
     )
 
 
-def tuned(tmp_path: Path, executor: Any = None, **keys: Any) -> TuneResult:
+def tuned(tmp_path: Path, executor=None, **keys) -> TuneResult:
     options = {name: keys.pop(name) for name in ("changed",) if name in keys}
     workers = keys.pop("workers", 1)
     return tuned_study(search(**keys), tmp_path / "tune", executor, workers, **options)
 
 
-def tuned_study(
-    study: Any, folder: Path, executor: Any = None, workers: int = 1, **options: Any
-) -> TuneResult:
+def tuned_study(study, folder: Path, executor=None, workers=1, **options) -> TuneResult:
     crew = Crew(executor or SerialExecutor(), workers, batch_s=0.0)
     with crew.executor:
         return tune(study, folder, crew, **options)
@@ -87,7 +84,7 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path):
     assert [] == again.trials
 
 
-def parameters(tmp_path: Path) -> list[tuple[Any, ...]]:
+def parameters(tmp_path: Path):
     """State, settings and values of all trials of a search, in the order of their suggestion."""
     from optuna.storages import JournalStorage
     from optuna.storages.journal import JournalFileBackend
@@ -108,7 +105,7 @@ def test_trials_are_the_same_with_any_number_of_workers(tmp_path):
     assert parameters(tmp_path / "one") == parameters(tmp_path / "several")
 
 
-CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
+CHANGES = {
     "held_out": ({"held_out": {"radius": [0.1]}}, {}, "the held-out part changed"),
     "homes": ({}, {"axes": {"radius": {"key": RADIUS, "values": [0.1, 0.12, 0.15]}}}, "homes"),
     "base": ({}, {"base": base("3 min", robots=PATROL)}, "base scenario"),

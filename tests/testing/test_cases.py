@@ -3,7 +3,6 @@
 import json
 import shlex
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -11,7 +10,7 @@ import yaml
 from tests.scenes import scenario
 
 
-def written(name: str = "home.yaml", **expect: Any) -> Path:
+def written(name="home.yaml", **expect) -> Path:
     content = scenario(
         "5 min",
         users={"ana": {"type": "meander"}},

@@ -17,10 +17,10 @@ SHARED = [0]
 class Sound(Algorithm):
     """Share of sightings, with a draw of its own."""
 
-    def start(self, home: Any) -> None:
+    def start(self, home):
         self.counts = np.zeros(len(home.rooms))
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         self.counts += np.bincount(history.observations.room, minlength=len(self.counts))
         self.counts[state.random("noise").below(len(self.counts))] += 1
         return RoomDistribution(self.counts)
@@ -31,31 +31,31 @@ class OnSight(Algorithm):
 
     on: tuple[str, ...] = ("user_seen",)
 
-    def start(self, home: Any) -> None:
+    def start(self, home):
         self.seen = 0
         self.marks = home.layers.add("marks", "int32")
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         self.seen += sum(event.event == "user_seen" for event in history.events)
         x, y = history.observations.x[-1], history.observations.y[-1]
         self.marks.set_at(x, y, self.marks.at(x, y) + 1)
         return {"seen": self.seen}
 
-    def remember(self) -> Any:
+    def remember(self):
         return {"seen": self.seen}
 
 
 class Dice(Algorithm):
     """Draws from the global generator."""
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         return {"roll": random.random()}
 
 
 class Shared(Algorithm):
     """Keeps its state in a global list."""
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         SHARED[0] += 1
         return {"count": SHARED[0]}
 
@@ -63,24 +63,24 @@ class Shared(Algorithm):
 class Opaque(Algorithm):
     """Keeps what no file holds."""
 
-    def start(self, home: Any) -> None:
+    def start(self, home):
         self.home_again = home
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         return {"x": 1}
 
 
 class Fickle(Algorithm):
     """Puts out other columns each time."""
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         return {f"x{state.step}": 1}
 
 
 class NotANumber(Algorithm):
     """Puts out NaN."""
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         return {"x": np.nan}
 
 
@@ -89,7 +89,7 @@ class Meddler(Algorithm):
 
     seen: ClassVar[list[Any]] = []
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         state.outputs["x"] = 1
 
 

@@ -21,7 +21,7 @@ from fleet2d.testing.claim import (
 CLAIMS = [(100, 0.95), (30, 0.9), (60, 0.5), (40, 1.0), (300, 0.98)]
 
 
-def mean_seeds(test: RateTest, rate: float) -> float:
+def mean_seeds(test: RateTest, rate):
     """The exact mean number of seeds until a decision if this is the true rate."""
     mean, undecided = 0.0, 1.0
     for accepted, refused, _ in steps_of(test.accept, test.refuse, rate):
@@ -83,7 +83,7 @@ def test_a_claim_of_every_seed_ends_with_the_first_failure():
 )
 def test_wrong_numbers_are_refused(settings, words):
     with pytest.raises(InputError, match=words):
-        rate_test(**settings)  # type: ignore[arg-type]
+        rate_test(**settings)
 
 
 @pytest.mark.parametrize(("held", "trials"), [(0, 10), (1, 20), (19, 20), (20, 20)])

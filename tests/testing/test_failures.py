@@ -1,7 +1,6 @@
 """Smaller versions of a failing run: each fails in the same way, for the same reason."""
 
 from datetime import datetime
-from typing import Any
 
 import pytest
 from tests.scenes import AGENDA, OWN, scenario
@@ -15,7 +14,7 @@ AGENDAS = {"type": "schedule", "days": AGENDA, "rest": "living_room"}
 CAMERA = {"range": [0.3, 4], "angle_deg": 108}
 
 
-def flat(duration: str = "20 min", **sections: Any) -> Variant:
+def flat(duration="20 min", **sections) -> Variant:
     from fleet2d.scenario.load import load_scenario
 
     content = scenario(
@@ -30,11 +29,11 @@ def flat(duration: str = "20 min", **sections: Any) -> Variant:
     return Variant(load_scenario(content | sections), {"seed": 4})
 
 
-def nothing(trial: Trial) -> None:
+def nothing(trial: Trial):
     """Expect what the scenario does."""
 
 
-def smaller(variant: Variant, body: Body = nothing, tries: int = 60) -> FailingCase:
+def smaller(variant: Variant, body: Body = nothing, tries=60) -> FailingCase:
     whole = run_trial(variant, body)
     assert whole.failures
     case = Shrinker(body, tries).shrink(whole)
@@ -45,7 +44,7 @@ def smaller(variant: Variant, body: Body = nothing, tries: int = 60) -> FailingC
 
 
 def test_it_keeps_the_violated_expectation_though_others_fail_in_less():
-    def body(trial: Trial) -> None:
+    def body(trial: Trial):
         trial.expect("never(room(bolt) == kitchen)", name="kitchen")
         trial.expect("eventually(room(ana) == storage, within=19 min)", name="storage")
 
@@ -57,7 +56,7 @@ def test_it_keeps_the_violated_expectation_though_others_fail_in_less():
 
 
 def test_it_keeps_the_interventions_that_a_missed_expectation_is_about():
-    def body(trial: Trial) -> None:
+    def body(trial: Trial):
         trial.do(Put("ben", "kitchen"))
         trial.do(ShutDoor("bath"))
         trial.do(Put("astro", "storage"))
@@ -74,7 +73,7 @@ def test_it_keeps_the_interventions_that_a_missed_expectation_is_about():
 
 
 def test_it_keeps_the_kind_of_violation():
-    def body(trial: Trial) -> None:
+    def body(trial: Trial):
         trial.advance(600)
         if trial.state["bolt"]["room"] is not None:
             assert trial.scenario.users == {}, "one line"
@@ -142,11 +141,11 @@ def test_what_must_come_by_the_end_keeps_its_time():
 
 @pytest.mark.parametrize("fails_once", [True, False])
 def test_a_report_says_when_the_failure_does_not_come_again(fails_once, tmp_path, monkeypatch):
-    drawn: list[tuple[Any, ...]] = []
+    drawn = []
     monkeypatch.setattr("fleet2d.viewing.figures.draw_failure", lambda *rest: drawn.append(rest))
-    runs: list[Trial] = []
+    runs = []
 
-    def body(trial: Trial) -> None:
+    def body(trial: Trial):
         runs.append(trial)
         sign = "==" if len(runs) == 1 or not fails_once else "!="
         trial.expect(f"always(room(ana) {sign} storage)", name="stays")

@@ -22,7 +22,7 @@ from fleet2d.testing.suite import SuiteTest, TrialKey, TrialOutcome, TrialReport
 TEST = SuiteTest(Path("home.yaml"), seeds=tuple(range(20)))
 
 
-def reports(failing: set[int], homes: int = 1, margin: float = 1.0) -> list[TrialReport]:
+def reports(failing, homes=1, margin=1.0) -> list[TrialReport]:
     """Twenty trials of one expectation, of which some fail; their homes in turn."""
     return [
         TrialReport(
@@ -38,12 +38,12 @@ def reports(failing: set[int], homes: int = 1, margin: float = 1.0) -> list[Tria
     ]  # fmt: skip
 
 
-def change(new: set[int], old: set[int], homes: int = 1) -> PairedChange:
+def change(new, old, homes=1) -> PairedChange:
     (found,) = compare(tally([TEST], reports(new, homes)), tally([TEST], reports(old, homes)))
     return found
 
 
-def gate(new: set[int], old: set[int] | None = None, margin: float = 1.0) -> Gate:
+def gate(new, old: set[int] | None = None, margin=1.0) -> Gate:
     tallies = tally([TEST], reports(new, margin=margin))
     if old is None:
         return Gate("2.1", tallies, coverage=cover(tallies, None))
@@ -87,7 +87,7 @@ def test_trials_of_one_home_count_once():
 def test_p_values_are_corrected_for_the_number_of_expectations():
     names = ["one", "two", "three"]
 
-    def of(failing: set[int]) -> list[Tally]:
+    def of(failing) -> list[Tally]:
         found = reports(failing)
         return [Tally(TEST.name, name, {r.key: r.outcomes[0] for r in found}) for name in names]
 

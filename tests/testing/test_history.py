@@ -13,7 +13,7 @@ from fleet2d.testing.suite import TrialKey, TrialOutcome, TrialReport
 PRINTS = {"home.yaml": "f00"}
 
 
-def report(seed: int, *, fails: bool = False, wall_s: float = 1.0) -> TrialReport:
+def report(seed, *, fails=False, wall_s=1.0) -> TrialReport:
     outcome = TrialOutcome("still", not fails, fails, "it moved", 0.5, "m")
     return TrialReport(TrialKey("home.yaml", "", seed), (outcome,), "", wall_s)
 
@@ -40,29 +40,29 @@ def test_trials_of_a_test_that_has_changed_are_not_compared(tmp_path):
         history.reports("2.O", PRINTS)
 
 
-def garbage(path: Path) -> None:
+def garbage(path: Path):
     path.write_bytes(b"no database at all, but long enough to be read as one" * 40)
 
 
-def foreign(path: Path) -> None:
+def foreign(path: Path):
     with sqlite3.connect(path) as file:
         file.execute("CREATE TABLE births (name TEXT)")
 
 
-def newer(path: Path) -> None:
+def newer(path: Path):
     VerdictHistory(path).add("2.0", PRINTS, [report(1)])
     with sqlite3.connect(path) as file:
         file.execute("PRAGMA user_version = 7")
 
 
-def locked(path: Path) -> None:
+def locked(path: Path):
     VerdictHistory(path).add("2.0", PRINTS, [report(1)])
     file = sqlite3.connect(path, check_same_thread=False)
     file.execute("BEGIN EXCLUSIVE")
     LOCKS.append(file)
 
 
-LOCKS: list[sqlite3.Connection] = []
+LOCKS = []
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_a_file_that_is_no_history_is_refused_before_anything_runs(
     fleet2d, monkeypatch, make, says
 ):
     monkeypatch.setattr("fleet2d.testing.history.WAIT_S", 0.1)
-    make(Path("history.db"))  # type: ignore[operator]
+    make(Path("history.db"))
     code, out, err = fleet2d(
         "test", written(apart=HOLDS), "--history", "history.db", "--build", "2.1"
     )

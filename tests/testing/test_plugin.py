@@ -2,10 +2,8 @@
 
 import re
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -35,15 +33,12 @@ class Result:
 class Counter:
     """Counts outcomes of tests."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.outcomes: dict[str, int] = {}
 
-    def pytest_runtest_logreport(self, report: Any) -> None:
+    def pytest_runtest_logreport(self, report):
         if report.when == "call":
             self.outcomes[report.outcome] = self.outcomes.get(report.outcome, 0) + 1
-
-
-Suite = Callable[..., Result]
 
 
 @pytest.fixture
@@ -56,7 +51,7 @@ def suite(tmp_path, monkeypatch, capsys):
     (tmp_path / "pytest.ini").write_text("[pytest]")
     monkeypatch.chdir(tmp_path)
 
-    def run(code: str, *options: str) -> Result:
+    def run(code, *options) -> Result:
         (tmp_path / "test_suite.py").write_text(HEAD + code)
         sys.modules.pop("test_suite", None)
         counter = Counter()

@@ -4,7 +4,6 @@ import pickle
 import random
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 import typer
@@ -53,7 +52,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def falsify(*arguments: str) -> Any:
+def falsify(*arguments):
     app = typer.Typer()
     app.command()(command.falsify)
     return CliRunner().invoke(app, [*arguments, "--workers", "1"])

@@ -12,11 +12,11 @@ FLAT = Claim(scenario("2 h", users=PEOPLE, robots={"astro": "patrol"})).variants
 
 
 def test_a_trial_ends_when_all_expectations_are_decided():
-    def soon(trial: Trial) -> None:
+    def soon(trial: Trial):
         trial.advance(100)
         trial.expect("eventually(distance(astro, ana) < 100 m, within=10 s)")
 
-    def to_the_end(trial: Trial) -> None:
+    def to_the_end(trial: Trial):
         trial.expect("always(distance(astro, ana) >= 0 m)")
 
     early, late = run_trial(FLAT, soon), run_trial(FLAT, to_the_end)
@@ -27,7 +27,7 @@ def test_a_trial_ends_when_all_expectations_are_decided():
 
 
 def test_all_that_fails_is_named_with_its_step_and_margin():
-    def body(trial: Trial) -> None:
+    def body(trial: Trial):
         trial.do(Put("ana", "kitchen"))
         trial.do(HoldStill("ana"))
         trial.advance(60)
@@ -47,7 +47,7 @@ def test_all_that_fails_is_named_with_its_step_and_margin():
 def test_interventions_can_be_left_out(without):
     rooms = []
 
-    def body(trial: Trial) -> None:
+    def body(trial: Trial):
         trial.do(Put("ana", "kitchen"))
         trial.do(Put("astro", "bathroom"))
         trial.advance()

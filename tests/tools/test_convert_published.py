@@ -6,7 +6,6 @@ import os
 import sys
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -138,9 +137,7 @@ robots:
       angle_deg: 108.0
 artifacts: {trajectories: 10 min}
 """
-CASES: list[dict[str, Any]] = yaml.safe_load(
-    (Path(__file__).parent / "converted.yaml").read_text(encoding="utf-8")
-)
+CASES = yaml.safe_load((Path(__file__).parent / "converted.yaml").read_text(encoding="utf-8"))
 WALKS = ("users.user0.base", "users.user1.base", "robot.base")
 USUAL = [
     "floorplan.he.ppm: the grid's cells are 0.05 m; walls and poses are not rounded to them",
@@ -171,7 +168,7 @@ def folder(tmp_path, shared_data, monkeypatch):
     return tmp_path / "home"
 
 
-def written(folder: Path, *changes: tuple[str, str], text: str = OLD) -> Path:
+def written(folder: Path, *changes: tuple[str, str], text=OLD) -> Path:
     for before, after in changes:
         assert before in text
         text = text.replace(before, after, 1)
@@ -184,7 +181,7 @@ def converted(folder: Path, *changes: tuple[str, str]) -> tuple[list[str], Scena
     return remarks, load_scenario(folder / "new.yaml")
 
 
-def refused(folder: Path, *changes: tuple[str, str], text: str = OLD) -> str:
+def refused(folder: Path, *changes: tuple[str, str], text=OLD):
     with pytest.raises(InputError) as caught:
         convert_file(written(folder, *changes, text=text), folder / "new.yaml")
     assert ["old.yaml", "plan.json"] == sorted(path.name for path in folder.iterdir())
@@ -198,7 +195,7 @@ def walk(entity: User | Robot) -> Meander:
 
 
 def plan_of(scenario: Scenario) -> tuple[str, Path, float]:
-    plan: Any = scenario.floorplan
+    plan = scenario.floorplan
     return plan.type_name, plan.path, plan.cell
 
 
@@ -418,7 +415,7 @@ def test_existing_file_is_not_overwritten(folder):
     ],
 )
 def test_file_that_cannot_be_written_leaves_nothing(folder, monkeypatch, code, kind, message):
-    def fail(descriptor: int) -> None:
+    def fail(descriptor):
         raise OSError(code, os.strerror(code))
 
     old = written(folder)
@@ -431,7 +428,7 @@ def test_file_that_cannot_be_written_leaves_nothing(folder, monkeypatch, code, k
 # The command line
 
 
-def call(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+def call(monkeypatch: pytest.MonkeyPatch, *arguments):
     monkeypatch.setattr(sys, "argv", ["convert_published.py", *arguments])
     return main()
 

@@ -4,9 +4,8 @@ import atexit
 import tempfile
 from functools import cache
 from pathlib import Path
-from typing import Any
 
-SOURCE: dict[str, Any] = {
+SOURCE = {
     "name": "small",
     "base": {
         "extends": "bundled:paper",
@@ -30,7 +29,7 @@ SOURCE: dict[str, Any] = {
 }
 
 
-def make(folder: Path, workers: int = 1) -> Any:
+def make(folder: Path, workers=1):
     """Make it."""
     import fleet2d
 
@@ -38,7 +37,7 @@ def make(folder: Path, workers: int = 1) -> Any:
 
 
 @cache
-def made() -> Any:
+def made():
     """Make it once for all tests of this process, which change copies of it only."""
     folder = tempfile.TemporaryDirectory(prefix="fleet2d-small-")
     atexit.register(folder.cleanup)

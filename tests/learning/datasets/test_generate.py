@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ from fleet2d.learning.datasets.tasks import windows
 from fleet2d.studies.design import code_version
 
 
-def records(data: Dataset) -> dict[str, str]:
+def records(data: Dataset):
     return {name: file.sha256 for name, file in data.manifest.files.items()}
 
 
@@ -139,7 +138,7 @@ def test_one_killed_before_it_noted_its_unfit_runs_goes_on(data, tmp_path):
     assert records(data) == records(make(tmp_path / "killed"))
 
 
-def unfit(folder: Path) -> dict[str, Any]:
+def unfit(folder: Path):
     """The small data set with one more household, of whom no home has the room."""
     log = folder / "sauna.txt"
     log.write_text("2026-01-05 15:10:00 Sauna Sauna ON Relax\n")

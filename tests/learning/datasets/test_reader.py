@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -18,7 +17,7 @@ VALUES = {"string": "x", "timestamp[us]": datetime(2026, 1, 5), "list<item: stri
 """Values of the types that are no numbers."""
 
 
-def written(path: Path, name: str, **changes: Any) -> Path:
+def written(path: Path, name, **changes) -> Path:
     row = {field.name: VALUES.get(str(field.type), 1) for field in SCHEMAS[name]} | changes
     table = pa.Table.from_pylist([row], SCHEMAS[name])
     pq.write_table(table, path)

@@ -1,7 +1,6 @@
 """What a data set is drawn from: fresh people, a seed for each run, and splits that share nothing."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,12 +11,12 @@ from fleet2d.learning.datasets.specification import plan_dataset
 BASE = {"extends": "bundled:paper", "simulation": {"duration": "2 h"}}
 
 
-def split(runs: int, first: int, *households: Any) -> dict[str, Any]:
+def split(runs, first, *households):
     homes = [{"synthetic": 2, "first": first}]
     return {"runs": runs, "homes": homes, "households": [list(h) for h in households]}
 
 
-def file(**splits: Any) -> dict[str, Any]:
+def file(**splits):
     return {"base": BASE, "splits": splits}
 
 

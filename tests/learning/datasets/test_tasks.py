@@ -1,7 +1,6 @@
 """Scores of tasks: differences by home, in which each home counts alike."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -64,7 +63,7 @@ def test_the_table_has_a_column_for_each_model_and_intervals_in_its_cells(capsys
     ]
 
 
-def made(folder: Path, duration: str, *users: Any, **keys: Any) -> Dataset:
+def made(folder: Path, duration, *users, **keys) -> Dataset:
     """Make a data set of a run for each of some households, each in a home of its own."""
     splits = {
         f"part{k}": {"runs": 1, "homes": [{"synthetic": 1, "first": k}], "households": [household]}

@@ -21,7 +21,7 @@ from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, pred
 from fleet2d.learning.datasets.windows import Windows
 
 
-def random_windows(seed: int, places: int = 4, count: int = 300) -> Windows:
+def random_windows(seed, places=4, count=300) -> Windows:
     """People who are where the first feature is largest, and a model that doesn't know."""
     random = np.random.default_rng(seed)
     features = random.normal(size=(count, places, TRACE_FEATURES)).astype(np.float32)
@@ -35,7 +35,7 @@ def random_windows(seed: int, places: int = 4, count: int = 300) -> Windows:
     )
 
 
-def loss(weights: Weights, windows: Windows) -> float:
+def loss(weights: Weights, windows: Windows):
     belief = predict(weights, windows)[np.arange(len(windows.truth)), windows.truth]
     return float(-np.log(np.maximum(belief, 1e-6)).mean())
 

@@ -1,7 +1,5 @@
 """Windows: features that use the past of what was perceived, and nothing else."""
 
-from typing import Any
-
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -17,11 +15,11 @@ def tables(data):
     return {name: data.arrow(name, "train") for name in SCHEMAS}
 
 
-def features(tables: dict[str, Any]) -> list[Windows]:
+def features(tables) -> list[Windows]:
     return list(windows_of(tables))
 
 
-def changed(table: pa.Table, column: str, which: Any, value: Any) -> pa.Table:
+def changed(table: pa.Table, column, which, value) -> pa.Table:
     values = table[column].to_pylist()
     for row in np.flatnonzero(which):
         values[row] = value(values[row]) if callable(value) else value

@@ -1,7 +1,6 @@
 """Logs of detections with known parameters."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ TRUE = {
 }  # fmt: skip
 
 
-def falling(x: F64, midpoint: float, width: float) -> F64:
+def falling(x: F64, midpoint, width) -> F64:
     return 1 / (1 + np.exp((x - midpoint) / width))
 
 
@@ -28,7 +27,7 @@ def shares(distance: F64, bearing: F64 | None, turned: F64 | None) -> F64:
     return p
 
 
-def simulated(seed: int, rows: int, *, bearing: bool = False, turned: bool = False) -> DetectionLog:
+def simulated(seed, rows, *, bearing=False, turned=False) -> DetectionLog:
     """Return a log of a detector with the true parameters."""
     rng = np.random.default_rng(seed)
     distance = rng.uniform(0.3, 7, rows)
@@ -40,7 +39,7 @@ def simulated(seed: int, rows: int, *, bearing: bool = False, turned: bool = Fal
     )
 
 
-def write(path: Path, **columns: Any) -> Path:
+def write(path: Path, **columns) -> Path:
     """Write columns to a CSV file."""
     lines = [
         ",".join(columns),

@@ -116,5 +116,5 @@ def test_nights_that_can_not_be_told_are_an_error(left_out, has, tmp_path):
 def test_a_wrong_option_is_told_before_anything_is_written(options, message, tmp_path):
     out = tmp_path / "persona.yaml"
     with pytest.raises(LogError, match=message):
-        fit_routine(events(tmp_path).path, out, **options)  # type: ignore[arg-type]
+        fit_routine(events(tmp_path).path, out, **options)
     assert not out.exists()

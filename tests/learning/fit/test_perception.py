@@ -46,19 +46,21 @@ def test_the_goodness_of_fit_of_true_models_is_uniform():
     assert low <= (25 if THOROUGH else 8)  # 3.7 deviations above the mean
 
 
-def test_identities_are_fitted_by_distance_with_their_confusion():
-    rng = np.random.default_rng(11)
-    rows = 20_000
+def identified(seed, rows, names, top, width, mistaken) -> DetectionLog:
+    """Return a log in which ana is mistaken for ben four times in five, and the others for ana."""
+    rng = np.random.default_rng(seed)
     distance = rng.uniform(0.3, 6, rows)
-    true = rng.choice(["ana", "ben", "cleo"], rows)
-    right = rng.random(rows) < 0.9 * falling(distance, 3.5, 0.5)
-    mistaken = rng.random(rows) < 0.3
-    other = np.where(true == "ana", np.where(rng.random(rows) < 0.8, "ben", "cleo"), "ana")
-    perceived = np.where(right, true, np.where(mistaken, other, ""))
-    every = rng.random(rows) < 0.8
-    calibration = calibrate(
-        DetectionLog(Path("x.csv"), distance, every, true_identity=true, identity=perceived)
-    )
+    true = rng.choice(names, rows)
+    right = rng.random(rows) < top * falling(distance, 3.5, width)
+    of_ana = np.where(rng.random(rows) < 0.8, "ben", names[-1])
+    other = np.where(true == "ana", of_ana, "ana")
+    perceived = np.where(right, true, np.where(rng.random(rows) < mistaken, other, ""))
+    detected = rng.random(rows) < 0.8
+    return DetectionLog(Path("x.csv"), distance, detected, true_identity=true, identity=perceived)
+
+
+def test_identities_are_fitted_by_distance_with_their_confusion():
+    calibration = calibrate(identified(11, 20_000, ["ana", "ben", "cleo"], 0.9, 0.5, 0.3))
     assert calibration.identity is not None
     estimates = calibration.identity.right.estimates
     for name, value in (("top", 0.9), ("distance midpoint", 3.5), ("distance width", 0.5)):
@@ -68,35 +70,22 @@ def test_identities_are_fitted_by_distance_with_their_confusion():
         {"ben": 0.8, "cleo": 0.2}, abs=0.03
     )
     assert {"ana": 1.0} == calibration.identity.confusion["ben"]
-    section = Perception.model_validate(calibration.section())
-    assert section.identity.right is not None
-    for x in (0.5, 3.0, 5.5):
-        assert section.identity.right.at(x) + section.identity.mistaken.at(x) <= 1
 
 
 def test_a_table_of_identities_follows_the_fit_and_never_adds_up_to_more_than_1():
     """Nobody is unknown here, so that right and mistaken add up to 1 everywhere."""
-    rng = np.random.default_rng(15)
-    rows = 8000
-    distance = rng.uniform(0.3, 6, rows)
-    true = rng.choice(["ana", "ben"], rows)
-    right = rng.random(rows) < 0.97 * falling(distance, 3.5, 0.3)
-    perceived = np.where(right, true, np.where(true == "ana", "ben", "ana"))
-    every = rng.random(rows) < 0.9
-    log = DetectionLog(Path("x.csv"), distance, every, true_identity=true, identity=perceived)
-    calibration = calibrate(log)
-    identity = Perception.model_validate(calibration.section()).identity
-    assert calibration.identity is not None
-    assert identity.right is not None
-    estimates = calibration.identity.right.estimates
-    values = (estimates[name].value for name in ("top", "distance midpoint", "distance width"))
-    top, midpoint, width = values
+    calibration = calibrate(identified(15, 8000, ["ana", "ben"], 0.97, 0.3, 1.0))
+    perception = Perception.model_validate(calibration.section())
+    identity, estimates = perception.identity, calibration.identity.right.estimates
+    top, midpoint, width = (
+        estimates[name].value for name in ("top", "distance midpoint", "distance width")
+    )
     for x in np.linspace(0, 6, 601).tolist():
         right_share, mistaken = identity.right.at(x), identity.mistaken.at(x)
         assert top * falling(x, midpoint, width) == pytest.approx(right_share, abs=0.006)
         assert 0.99 < right_share + mistaken <= 1 + 1e-12
     error_tables(
-        [Camera().lens(1280, 10**6)], [Perception.model_validate(calibration.section())],
+        [Camera().lens(1280, 10**6)], [perception],
         TableContext(["ana", "ben"], [256.0] * 2, LATTICE, 10**6, "robots.r"),
     )  # fmt: skip
     assert any("ana, ben" in note for note in calibration.notes)

@@ -46,7 +46,7 @@ FIRST = datetime(2020, 3, 2)  # a Monday
 LOGS = ["homer_plus_a", "uci_adl_a", "casas_al/events_10_days.txt"]
 
 
-def write_life(folder: Path, days: int = 24, weekend: bool = True) -> Path:
+def write_life(folder: Path, days=24, weekend=True) -> Path:
     """Write the log of a life that is known: UCI ADL activities of some days.
 
     Asleep 23:00 to 07:00 ± 10 min, out at 09:00 ± 5 min for 3 h on weekdays; else by turns an hour
@@ -55,7 +55,7 @@ def write_life(folder: Path, days: int = 24, weekend: bool = True) -> Path:
     rows = []
     key = stream_key(1, "life", "days")
 
-    def clock(day: int, minute: float) -> str:
+    def clock(day, minute):
         return f"{FIRST + timedelta(days=day, minutes=minute):%Y-%m-%d %H:%M:%S}"
 
     wake = [7 * 60 + Draws(key, day).below(21) - 10 for day in range(days + 1)]
@@ -238,7 +238,7 @@ def test_a_private_persona_is_nearly_as_close_to_days_held_back(shared_data, nam
     assert exact.ks < 0.85 * exact_chain.ks
 
 
-def nights(days: int, *states: ActivityPlace) -> Timeline:
+def nights(days, *states: ActivityPlace) -> Timeline:
     """Return days of the first state, and of the second from 23:00 to 07:00."""
     minutes = np.zeros((days, DAY_MINUTES), np.int16)
     minutes[:, 23 * 60 :], minutes[:, : 7 * 60] = 1, 1
@@ -327,7 +327,7 @@ def test_the_command_writes_a_persona_and_a_picture_and_says_how_good_it_is(
 )
 def test_a_log_that_nothing_can_be_fitted_to_is_refused(tmp_path, make, message):
     with pytest.raises(LogError, match=message):
-        fit_routine(make(tmp_path), tmp_path / "persona.yaml")  # type: ignore[operator]
+        fit_routine(make(tmp_path), tmp_path / "persona.yaml")
     assert not (tmp_path / "persona.yaml").exists()
 
 

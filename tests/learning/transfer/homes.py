@@ -17,9 +17,9 @@ DAY = (
 
 def write_home(
     path: Path,
-    days: int,
+    days,
     *,
-    shift_min: int = 0,
+    shift_min=0,
     silent: Collection[int] = (),
     labels: Mapping[str, str] | None = None,
 ) -> Path:

@@ -3,7 +3,6 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -21,7 +20,7 @@ from fleet2d.studies.api import open_crew
 from fleet2d.studies.reader import Study, open_study
 
 pytestmark = pytest.mark.slow
-SETTINGS: dict[str, Any] = {
+SETTINGS = {
     "days": [0, 3],
     "tasks": ["room in 60 min", "activity"],
     "arms": ["real", "own", "both", "fitted", "markov"],
@@ -53,7 +52,7 @@ def made(file):
     return open_study(file.parent / "made")
 
 
-def scores(study: Study) -> list[tuple[Any, ...]]:
+def scores(study: Study):
     frame = study.variants.filter(task="activity").sort(COLUMNS)
     return frame.select(*COLUMNS, "log_loss", "accuracy", "cases").rows()
 
@@ -67,10 +66,10 @@ def test_a_kill_loses_only_the_cell_under_way_and_results_are_the_same(
 ):
     one = file.with_name("one.yaml")
     one.write_text(file.read_text().replace("- room in 60 min\n", ""))
-    trained: list[Any] = []
+    trained = []
     score = learners.forecast
 
-    def dies_at_the_fourth(*arguments: Any) -> Any:
+    def dies_at_the_fourth(*arguments):
         trained.append(arguments)
         if len(trained) == 4:
             raise Killed
@@ -156,7 +155,7 @@ def test_people_who_fit_into_no_home_are_left_out_with_their_cells(
 ):
     check = generate.check_dataset
 
-    def finds_no_room(content: Any, *arguments: Any, **keys: Any) -> None:
+    def finds_no_room(content, *arguments, **keys):
         if content["name"] == "simulated":
             raise ScenarioError("no home has a room for them")
         check(content, *arguments, **keys)

@@ -1,7 +1,6 @@
 """The file of an experiment: all that can't be trained or scored is told before the first run."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -11,7 +10,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.learning.transfer.specification import TransferPlan, read_plan
 
 
-def plan(folder: Path, homes: dict[str, Any], **keys: Any) -> TransferPlan:
+def plan(folder: Path, homes, **keys) -> TransferPlan:
     content = {"tasks": ["room in 60 min"], "days": [0, 3], "homes": homes, **keys}
     path = folder / "homes.yaml"
     path.write_text(yaml.safe_dump(content))

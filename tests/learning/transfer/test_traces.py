@@ -32,7 +32,7 @@ def trace(tmp_path):
     return trace_of(write_home(tmp_path / "home.txt", 4))
 
 
-def at(trace: MinuteTrace, clock: str) -> tuple[str, str, str]:
+def at(trace: MinuteTrace, clock) -> tuple[str, str, str]:
     """Room, sensor and activity at a time of the first day."""
     minute = int(clock[:2]) * 60 + int(clock[3:])
     codes = trace.rooms[minute], trace.sensors[minute], trace.activities[minute]

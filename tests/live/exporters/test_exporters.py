@@ -93,7 +93,7 @@ def test_failed_export_leaves_the_file_as_it_was(tmp_path):
     path = tmp_path / "w.csv"
     path.write_text("before")
 
-    def fail() -> None:
+    def fail():
         with new_file(path) as file:
             file.write(b"half")
             raise ZeroDivisionError

@@ -21,7 +21,7 @@ ORDER BY s.state_id
 """
 
 
-def states_of(path: Path, entity: str) -> list[tuple[str, datetime]]:
+def states_of(path: Path, entity) -> list[tuple[str, datetime]]:
     with closing(sqlite3.connect(path)) as database:
         rows = database.execute(STATES).fetchall()
     return [(state, datetime.fromtimestamp(at, UTC)) for name, state, at in rows if name == entity]
@@ -58,7 +58,7 @@ def test_rooms_and_presence_equal_the_poses_at_each_step(database):
 
 
 @cache
-def berlin_rooms() -> list[str]:
+def berlin_rooms():
     return [room.name for room in fleet2d.load_floorplan("family_home").rooms]
 
 

@@ -3,7 +3,6 @@
 import itertools
 import json
 from pathlib import Path
-from typing import Any
 
 from tests.runs.test_robot_log import stored
 
@@ -20,11 +19,11 @@ FIELDS = {
 }
 
 
-def trace(tmp_path: Path, first: int = 0, end: int | None = None) -> list[dict[str, Any]]:
+def trace(tmp_path: Path, first=0, end: int | None = None):
     file = tmp_path / "trace.json"
     line = export(stored(), file, "perfetto", first=first, end=end)
     content = json.loads(file.read_text())
-    events: list[dict[str, Any]] = content["traceEvents"]
+    events = content["traceEvents"]
     assert {"displayTimeUnit", "otherData", "traceEvents"} == content.keys()
     assert content["displayTimeUnit"] in ("ms", "ns")
     assert line == f"{len(events):,} trace events in {file}"

@@ -30,7 +30,7 @@ def part() -> Selection:
     return Selection(FIRST, END, EVERY)
 
 
-def poses(name: str) -> list[tuple[int, float, float, float]]:
+def poses(name) -> list[tuple[int, float, float, float]]:
     """The step, x, y [m] and heading [rad] of a body in the part, without those away."""
     path = day().path(name, EVERY)
     at = np.flatnonzero((path.step >= FIRST) & (path.step < END) & ~path.away)
@@ -38,7 +38,7 @@ def poses(name: str) -> list[tuple[int, float, float, float]]:
     return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def rows(table: str) -> list[dict[str, object]]:
+def rows(table) -> list[dict[str, object]]:
     """The rows of a table in the part."""
     return [row for row in day().tables[table].to_pylist() if FIRST <= row["step"] < END]
 

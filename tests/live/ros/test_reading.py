@@ -5,7 +5,6 @@ import copy
 import math
 import random
 import time
-from typing import Any
 
 import pytest
 
@@ -15,13 +14,13 @@ from fleet2d.live.messages import parse_message
 from fleet2d.live.ros.reading import contents_of, velocities_of
 
 
-def stamped(**header: Any) -> dict[str, Any]:
+def stamped(**header):
     place = {"x": 1.0, "y": 2.0, "z": 0.0}
     turn = {"x": 0.0, "y": 0.0, "z": 1.414, "w": 1.414}
     return {"header": header, "pose": {"position": place, "orientation": turn}}
 
 
-def contents(message: object, kind: str = "pose") -> list[Content]:
+def contents(message, kind="pose") -> list[Content]:
     return list(contents_of("ana", kind, "/ana/pose", message))
 
 
@@ -63,7 +62,7 @@ def test_the_stamp_0_means_now_and_a_simulated_clock_is_told():
 
 def test_a_goal_keeps_its_orientation():
     (content,) = contents(stamped(frame_id="map"), "goal")
-    goal: Any = parse_message(content)  # type: ignore[arg-type]
+    goal = parse_message(content)
     assert (goal.to, goal.heading_deg) == ((1.0, 2.0), pytest.approx(90))
 
 
@@ -98,7 +97,7 @@ def test_a_message_without_a_pose_is_wrong(message, why):
 ODD = (None, "", "x", 1e308, -1e308, math.nan, math.inf, 10**400, -1, [], {}, [[]], True, "\x1b[2J")
 
 
-def mutated(message: Any, draw: random.Random) -> Any:
+def mutated(message, draw: random.Random):
     """Return a message with one value removed, replaced, or moved below an odd key."""
     message = copy.deepcopy(message)
     place = message
@@ -117,14 +116,14 @@ def mutated(message: Any, draw: random.Random) -> Any:
 def test_no_mutation_of_a_message_is_more_than_a_fault():
     draw = random.Random(5)
     stamp = {"sec": int(time.time()), "nanosec": 1}
-    message: Any = stamped(frame_id="map", stamp=stamp)
+    message = stamped(frame_id="map", stamp=stamp)
     for _ in range(1000):
         odd = mutated(message, draw)
         odd = mutated(odd, draw) if draw.random() < 0.5 else odd
         for content in contents(odd, draw.choice(["pose", "goal"])):
             if not isinstance(content, PeerFault):
                 with contextlib.suppress(InputError):
-                    parse_message(content)  # type: ignore[arg-type]
+                    parse_message(content)
 
 
 def test_a_stamp_near_the_simulated_time_is_of_its_clock():

@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -57,7 +56,7 @@ def test_what_is_left_out_is_zero_or_empty(distribution):
 
 def test_messages_come_back_as_they_were():
     types = RosTypes()
-    scan: dict[str, Any] = {"angle_min": -3.0, "ranges": np.array([1.0, np.inf], np.float32)}
+    scan = {"angle_min": -3.0, "ranges": np.array([1.0, np.inf], np.float32)}
     transform = {"child_frame_id": "astro/odom", "transform": {"rotation": {"w": 1.0}}}
 
     back = types.decode(
