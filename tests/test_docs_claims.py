@@ -162,7 +162,6 @@ def test_json_has_the_keys_of_the_page(fleet2d):
         "run", "bundled:paper", "simulation.duration=10 min", "--json", "--out", "ten"
     )
     shown = re.search(r"```json\n(\{.*?\})\n```", page("cli"), re.DOTALL)
-    assert shown is not None
     printed, said = yaml.safe_load(out), yaml.safe_load(shown[1])
     assert 0 == code
     assert set(said) == set(printed)
@@ -182,7 +181,6 @@ def test_the_bundled_month_is_as_the_pages_say():
     """Its error of presence after the month, and the rounds that the robot makes."""
     month = run({"extends": "bundled:paper"})
     said = re.search(r"printed by `fleet2d run`: (0\.\d+) after the month", page("presence"))
-    assert said is not None
     assert float(said[1]) == pytest.approx(month.metrics["ltp_error"]["ana"]["tv"], abs=0.0005)
 
 
@@ -193,7 +191,6 @@ def test_messages_of_the_page_of_interventions_are_those_of_the_program(fleet2d)
     """Each wrong value is put into the page's own file; a message ends where the page has …"""
     text = page("interventions")
     scenario = re.search(r"```yaml title=evening.yaml\n(.*?)```", text, re.DOTALL)
-    assert scenario is not None
     wrong = [
         [("guest: gina,", "guest: gna,")],
         [("{type: find}, ", "")],
@@ -224,7 +221,6 @@ def test_interventions_of_the_page_exist():
 def test_rates_that_seeds_can_tell_apart_are_as_the_page_says():
     text = page("product-tests")
     said = re.search(r"30 tell 90 % from (\d+) %, 100 from (\d+) %, 300 from (\d+) %", text)
-    assert said is not None
     for seeds, percent in zip((30, 100, 300), said.groups(), strict=True):
         assert int(percent) == round(100 * rate_test(seeds, 0.9).alternative)
     assert f"{100 * rate_test(100, 0.9).alternative:.1f} %" in text
@@ -248,7 +244,6 @@ def test_keys_of_floor_plans_are_those_of_the_page():
 
 def test_the_bundled_home_is_as_large_as_the_page_says():
     said = re.search(r"a home of (\d+) m² and (\d+) rooms", page("floorplans"))
-    assert said is not None
     plan = fleet2d.load_floorplan()
     assert (round(plan.area_m2), len(plan.rooms)) == (int(said[1]), int(said[2]))
 

@@ -306,9 +306,7 @@ def test_known_failure_05_what_is_tried_elsewhere_is_tried_there():
 @pytest.fixture(scope="module")
 def usual():
     """What comes of the scenario as it is."""
-    found = effects(life())
-    assert isinstance(found, tuple)
-    return found
+    return effects(life())
 
 
 @pytest.mark.slow

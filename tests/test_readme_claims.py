@@ -55,7 +55,6 @@ def test_the_family_is_as_described():
     run = family(1)
     assert {"users": ["ana", "ben", "cleo"], "robots": ["astro"]} == run.manifest["entities"]
     tables = re.search(r"Parquet file per table\s*\(([^)]*)\)", text())
-    assert tables is not None
     assert set(run.tables) == set(re.findall(r"`(\w+)`", tables[1]))
 
 
@@ -87,7 +86,6 @@ def test_the_robot_of_the_scenario_sees_ana_as_often_as_it_says(tmp_path):
     write_titled_blocks(README, tmp_path)
     run = fleet2d.run(tmp_path / "home.yaml")
     said = re.search(r"sees Ana during (\d+) % of her time", text())
-    assert said is not None
     assert said[1] == f"{100 * run.metrics['sightings']['ana']:.0f}"
 
 

@@ -141,5 +141,4 @@ def test_a_learner_is_as_good_on_a_real_log_as_the_page_says(shared_data, tmp_pa
         errors[name] = run.metrics["ltp_error"]["ana"]["tv"]
 
     said = re.search(r"of ([\d.]+) from the truth on the real log, and of ([\d.]+) on", PAGE)
-    assert said is not None
     assert [round(errors[name], 3) for name in users] == [float(text) for text in said.groups()]

@@ -107,7 +107,6 @@ def test_append_of_all_scalars_to_strings_adds_one_row():
 
     chunk = buffer.take()
     assert [0] == chunk["b"].values.tolist()
-    assert chunk["a"].valid is not None
     assert [False] == chunk["a"].valid.tolist()
 
 

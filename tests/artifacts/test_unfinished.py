@@ -72,10 +72,8 @@ def test_a_journal_that_begins_again_describes_its_tables_again(tmp_path):
 
 def kill(store: RunStore) -> Path:
     """End a run as the end of its process would: nothing more is written, the lock goes."""
-    assert store._unfinished is not None
     store._unfinished.journal.close()
     store._unfinished.release()
-    assert store.directory is not None
     return store.directory
 
 
@@ -287,7 +285,6 @@ def test_a_disk_that_fails_when_the_journal_is_closed_ends_no_run(tmp_path, monk
         close(handle)
         raise OSError(5, "Input/output error")
 
-    assert store._unfinished is not None
     handle = store._unfinished.journal._handle
     monkeypatch.setattr("fleet2d.storage.files.os.close", lambda h: (fail if h == handle else close)(h))  # fmt: skip
     store.close(status)

@@ -201,7 +201,6 @@ def half_a_run(name) -> package.Simulation:
     )
     simulation.advance(200)
     interruptions = simulation._state.find(Interruptions)
-    assert interruptions is not None
     waits = interruptions._held
     waits[next(iter(waits))[0], name] = False
     return simulation

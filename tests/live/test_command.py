@@ -80,7 +80,6 @@ def test_a_run_that_was_ended_is_continued_by_resume(tmp_path, number):
     arguments += ["--speed", "60", "--out", str(tmp_path / "run")]
     command = [sys.executable, "-m", "fleet2d.cli", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stderr is not None
     assert "listens at" in process.stderr.readline()
     time.sleep(1)
     process.send_signal(number)

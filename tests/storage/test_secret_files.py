@@ -41,10 +41,8 @@ def test_processes_that_make_it_at_once_end_with_one(key, tmp_path):
         Popen([sys.executable, "-c", code], stdin=PIPE, stdout=PIPE, text=True) for _ in range(4)
     ]
     for each in starts:
-        assert each.stdout is not None
         assert "ready\n" == each.stdout.readline()
     for each in starts:
-        assert each.stdin is not None
         each.stdin.write("x")
         each.stdin.flush()
     secrets = {each.communicate()[0].strip() for each in starts}

@@ -81,7 +81,6 @@ def test_p_values_of_one_value_or_of_equal_ones():
 def test_a_study_of_the_size_that_is_needed_detects_the_effect():
     spread = study_of(6, 0.7).spread
     homes = spread.needed(0.7, "home", units={"seed": 10})
-    assert homes is not None
     assert spread.detectable({"home": homes, "seed": 10}) <= 0.7
     assert spread.detectable({"home": homes - 1, "seed": 10}) > 0.7
     assert spread.needed(0.1, "seed") is None  # homes differ: seeds alone don't do

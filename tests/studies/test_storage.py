@@ -101,7 +101,6 @@ def test_a_server_that_does_not_answer_is_told(monkeypatch):
 def test_a_file_location_is_a_folder_like_others(tmp_path):
     storage = Storage((tmp_path / "new" / "study").as_uri())
     storage.write("results/a.txt", b"a")
-    assert storage.folder is not None
     assert b"a" == (tmp_path / "new" / "study" / "results" / "a.txt").read_bytes()
     assert str(tmp_path / "new" / "study") == storage.location
 

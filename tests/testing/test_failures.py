@@ -37,7 +37,6 @@ def smaller(variant: Variant, body: Body = nothing, tries=60) -> FailingCase:
     whole = run_trial(variant, body)
     assert whole.failures
     case = Shrinker(body, tries).shrink(whole)
-    assert case is not None
     again = run_trial(case.variant, body, without=case.without)
     assert [f.text for f in again.failures] == [f.text for f in case.result.failures]
     return case
@@ -135,7 +134,6 @@ def test_what_must_come_by_the_end_keeps_its_time():
     whole = run_trial(late, nothing)
     case = Shrinker(nothing, 60).shrink(whole)
 
-    assert case is not None
     assert late.scenario.simulation.duration == case.variant.scenario.simulation.duration
 
 

@@ -31,9 +31,7 @@ def events(path: Path) -> ActivityLog:
                 lines.append(f"2026-03-0{day} {time} {sensor} ON{mark}")
     file = path / "data"
     file.write_text("\n".join(lines) + "\n")
-    log = read_log(file)
-    assert isinstance(log, ActivityLog)
-    return log
+    return read_log(file)
 
 
 def test_labels_are_given_kinds_of_rooms(tmp_path):

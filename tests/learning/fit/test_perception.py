@@ -61,7 +61,6 @@ def identified(seed, rows, names, top, width, mistaken) -> DetectionLog:
 
 def test_identities_are_fitted_by_distance_with_their_confusion():
     calibration = calibrate(identified(11, 20_000, ["ana", "ben", "cleo"], 0.9, 0.5, 0.3))
-    assert calibration.identity is not None
     estimates = calibration.identity.right.estimates
     for name, value in (("top", 0.9), ("distance midpoint", 3.5), ("distance width", 0.5)):
         assert value == pytest.approx(estimates[name].value, rel=0.05)
@@ -139,8 +138,6 @@ def test_a_fragment_runs_and_so_does_a_scenario_that_extends_it(tmp_path):
     for file in (alone, both):
         loaded = load_scenario(file)
         robot = loaded.robots["astro"]
-        assert robot.perception is not None
-        assert robot.camera is not None
         assert 1 == robot.camera.detection
         assert isinstance(robot.perception.detection.bearing, Curve)
         assert 4 == pytest.approx(robot.perception.detection.distance.midpoint, rel=0.1)
@@ -165,8 +162,6 @@ def test_angles_are_read_in_the_unit_that_their_column_tells(tmp_path):
     radians = read_detections(
         write(tmp_path / "b.csv", **GOOD, bearing_rad=[-np.pi / 6, np.pi] * (ROWS // 2))
     )
-    assert degrees.bearing is not None
-    assert radians.bearing is not None
     assert [30, 10] == pytest.approx(degrees.bearing[:2].tolist())
     assert [30, 180] == pytest.approx(radians.bearing[:2].tolist())
 

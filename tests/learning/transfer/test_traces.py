@@ -18,12 +18,10 @@ from fleet2d.learning.transfer.traces import (
     write_log,
 )
 from fleet2d.logs.layout import read_log
-from fleet2d.logs.log import ActivityLog
 
 
 def trace_of(path: Path) -> MinuteTrace:
     log = read_log(path)
-    assert isinstance(log, ActivityLog)
     return trace_of_log(log, {}, {})
 
 

@@ -39,7 +39,6 @@ def test_a_pose_in_the_map_is_a_pose(frame):
 @pytest.mark.parametrize("frame", ["astro/base_link", "odom", "mapped", "/astro/odom"])
 def test_a_pose_in_another_frame_is_left_out_and_told(frame):
     (fault,) = contents(stamped(frame_id=frame))
-    assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("in other frames", True)
     assert fault.text.startswith(f"/ana/pose is in the frame {frame.lstrip('/')!r}: ")
 
@@ -48,14 +47,12 @@ def test_the_stamp_is_the_time_of_a_pose():
     now = int(time.time()) - 3600
     for stamp in ({"sec": now, "nanosec": 500_000_000}, {"secs": now, "nsecs": 500_000_000}):
         (content,) = contents(stamped(frame_id="map", stamp=stamp))
-        assert isinstance(content, dict)
         assert content["time"] == now + 0.5
 
 
 def test_the_stamp_0_means_now_and_a_simulated_clock_is_told():
     assert "time" not in str(contents(stamped(stamp={"sec": 0, "nanosec": 0})))
     fault, content = contents(stamped(stamp={"sec": 12, "nanosec": 0}))
-    assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("of a simulated clock", False)
     assert "time" not in str(content)
 
@@ -71,7 +68,6 @@ def test_a_quaternion_that_says_nothing_is_no_heading(turn):
     message = stamped(frame_id="map")
     message["pose"]["orientation"] = turn
     fault, content = contents(message)
-    assert isinstance(fault, PeerFault)
     assert fault.kind == "without heading"
     assert "heading_deg" not in str(content)
 
@@ -89,7 +85,6 @@ def test_a_quaternion_that_says_nothing_is_no_heading(turn):
 )
 def test_a_message_without_a_pose_is_wrong(message, why):
     (fault,) = contents(message)
-    assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("wrong", True)
     assert fault.text.startswith(f"/ana/pose: {why}")
 
@@ -151,6 +146,5 @@ def test_a_twist_is_a_velocity(is_stamped):
 @pytest.mark.parametrize("number", [math.nan, math.inf, None, "fast"])
 def test_a_velocity_that_is_no_finite_number_is_wrong(number):
     (fault,) = velocities_of("astro", "/astro/cmd_vel", {"linear": {"x": number}})
-    assert isinstance(fault, PeerFault)
     assert (fault.kind, fault.is_message) == ("wrong", True)
     assert fault.text.startswith("/astro/cmd_vel: linear.x: ")
