@@ -1,10 +1,8 @@
 """Whatever a file would unfold to, it is refused with the bound that it breaks, and how to raise it."""
 
-import io
 import json
 import os
 import struct
-import zipfile
 import zlib
 from collections.abc import Callable
 from datetime import datetime, timedelta
@@ -49,6 +47,9 @@ MERGES = "a0: &a0 {x: 1, y: 2}\n" + "".join(
 )
 
 
+MANY_ROWS = pa.table({name: np.zeros(1 << 17) for name in ("time", "x", "y")})
+
+
 def png(columns, rows):
     """A picture of black pixels, a thousandth of what it unpacks to."""
 
@@ -61,30 +62,6 @@ def png(columns, rows):
     return (
         b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", packed) + chunk(b"IEND", b"")
     )
-
-
-def npz(size):
-    """An array of zeros, packed to a thousandth."""
-    target = io.BytesIO()
-    with (
-        zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive,
-        archive.open("counts.npy", "w", force_zip64=True) as file,
-    ):
-        head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({size // 8},), }}"
-        text = head.ljust(117).encode() + b"\n"
-        file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text)
-        zeros = bytes(1 << 20)
-        for _ in range(size >> 20):
-            file.write(zeros)
-    return target.getvalue()
-
-
-def parquet(path: Path, rows):
-    """A table of one value, repeated."""
-    table = pa.table({name: pa.array(np.zeros(1 << 17)) for name in ("time", "x", "y")})
-    with pq.ParquetWriter(path, table.schema) as writer:
-        for _ in range(rows >> 17):
-            writer.write_table(table)
 
 
 @pytest.mark.parametrize(
@@ -159,13 +136,13 @@ def bomb(name, folder: Path) -> tuple[Path, Callable[[Path], Any], str]:
             path.write_bytes(b"P5 100000 100000 255\n")
             return path, lambda p: load_floorplan(p, resolution=0.05), "PIXELS"
         case "learned.npz":
-            path.write_bytes(npz(4 << 20))
+            np.savez_compressed(path, counts=np.zeros(1 << 19))
             return path, load_learned, "LEARNED_BYTES"
         case "table.parquet":
-            parquet(path, 1 << 17)
+            pq.write_table(MANY_ROWS, path)
             return path, read_parquet, "TABLE_BYTES"
         case "fixes.parquet":
-            parquet(path, 1 << 17)
+            pq.write_table(MANY_ROWS, path)
             return path, read_log, "FIXES"
         case "plan.json":
             path.write_text('{"verts": [' + "[]," * 9_000 + "[]]}")

@@ -37,14 +37,6 @@ def test_plain_has_words_for_what_models_hold():
     assert expected == plain(given)
 
 
-def test_manifest_round_trip(tmp_path):
-    manifest = Manifest(status="complete", seed=4, steps=10, step_us=10**6, start="2026-01-05")
-    manifest.write(tmp_path)
-
-    assert manifest == Manifest.read(tmp_path)
-    assert ["manifest.json"] == [path.name for path in tmp_path.iterdir()]
-
-
 def test_manifest_is_sorted_and_strict_json(tmp_path):
     Manifest(metrics={"b": math.nan, "a": np.float64(math.inf)}).write(tmp_path)
 

@@ -35,16 +35,6 @@ def test_trajectories_take_off_every_step_or_a_duration(value, expected):
     assert expected == ArtifactSettings(trajectories=value).trajectories
 
 
-def test_default_is_every_simulated_hour_and_all_else():
-    settings = ArtifactSettings()
-
-    assert timedelta(hours=1) == settings.trajectories
-    assert settings.key_frames
-    assert settings.observations
-    assert settings.events
-    assert settings.outputs
-
-
 @pytest.mark.parametrize("value", ["sometimes", "5 m", True, -1, "0 s"])
 def test_trajectories_refuse_anything_else(value):
     with pytest.raises(ValidationError):
@@ -290,19 +280,6 @@ def test_disk_full_at_the_manifest_leaves_whole_tables(tmp_path, monkeypatch):
     run = open_run(tmp_path / "run")
     assert "running" == run.status
     assert [1] == run.arrow("poses")["step"].to_pylist()
-
-
-def test_abandoned_run_is_readable(tmp_path):
-    store = opened(tmp_path / "run", EVERY_KIND, flush_rows=64)
-    rows = rows_of_every_kind(300)
-    store.append("every_kind", **part(rows, 0, 130))
-    store.close("interrupted")
-
-    run = open_run(tmp_path / "run")
-    assert "interrupted" == run.status
-    assert rows["step"][:130].tolist() == run.arrow("every_kind")["step"].to_pylist()
-    assert [] == run.verify()
-    assert any("interrupted" in note for note in run.notes)
 
 
 def test_words_of_an_interrupted_append_are_not_part_of_the_digest(tmp_path, monkeypatch):

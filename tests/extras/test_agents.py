@@ -3,7 +3,6 @@
 import runpy
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -71,7 +70,7 @@ def test_table_of_a_task_has_everybody_and_no_one_above_the_bound(
     assert all(reward <= rewards["bound"] + slack for reward in rewards.values())
 
 
-def slow_bound(people: list[Any], stations: Any, weights: dict[str, float]) -> float:
+def slow_bound(people, stations, weights):
     """Return the bound of hangout second by second, by recursion over what is best next."""
     near = [
         [
@@ -146,7 +145,7 @@ def test_bound_of_a_request_is_that_of_its_best_moment(script):
         bounds["Piece"](1200, 1800, "breakfast"),
     ]
 
-    def worth(tries: int, pieces: list[Any] = pieces) -> float:
+    def worth(tries, pieces=pieces):
         pill = Interaction(do="remind", to="ana", at=["08:00"], worth=5, tries=tries)
         return float(bounds["_worth_of_request"](pieces, 0, pill, 2.0, weights))
 

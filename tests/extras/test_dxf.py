@@ -1,7 +1,6 @@
 import math
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,15 +21,15 @@ JAMBS = [[(4.0, 1.5), (4.2, 1.5)], [(4.0, 2.4), (4.2, 2.4)]]
 
 def write(
     folder: Path,
-    unit_m: float = 1.0,
-    units: int = 6,
-    layer: str = "A-WALL",
-    windows: tuple[Any, ...] = (),
+    unit_m=1.0,
+    units=6,
+    layer="A-WALL",
+    windows=(),
 ) -> Path:
-    drawing: Any = ezdxf.new(units=units)
+    drawing = ezdxf.new(units=units)
     space = drawing.modelspace()
 
-    def line(points: Any, on: str, close: bool = False) -> None:
+    def line(points, on, close=False):
         scaled = [(x / unit_m, y / unit_m) for x, y in points]
         space.add_lwpolyline(scaled, close=close, dxfattribs={"layer": on})
 
@@ -95,9 +94,9 @@ UNITS = [(0.001, 4), (0.01, 5), (1.0, 6), (0.0254, 1), (0.3048, 2), (0.001, 0)]
 LIES = [(0.0254, 4), (0.001, 6), (0.01, 4), (0.0254, 6), (0.01, 1)]
 
 
-def drawn(home: SmallHome, k: int, folder: Path) -> Path:
+def drawn(home: SmallHome, k, folder: Path) -> Path:
     unit_m, header = (UNITS + LIES)[k % 11]
-    drawing: Any = ezdxf.new(units=header)
+    drawing = ezdxf.new(units=header)
     space = drawing.modelspace()
     layer = {"layer": ("WALL", "A-WALL", "Wände", "MURS", "Muros", "0-MURI")[k % 6]}
 
@@ -135,7 +134,7 @@ def test_drawings_of_any_unit_language_and_turn_are_the_home(tmp_path, k):
 
 
 def test_a_drawing_without_a_unit_and_doors_is_refused_with_the_sizes(tmp_path):
-    drawing: Any = ezdxf.new(units=0)
+    drawing = ezdxf.new(units=0)
     for corners in (
         [(0, 0), (900, 0), (900, 700), (0, 700)],
         [(20, 20), (880, 20), (880, 680), (20, 680)],

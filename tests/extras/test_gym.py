@@ -23,22 +23,22 @@ TASKS = ["hangout", "find", "patrol", "interact"]
 SHAPES = {"interact": (8, 33)}
 
 
-def policy(task: str = "hangout", **fields: Any) -> dict[str, Any]:
+def policy(task="hangout", **fields):
     return {"type": "policy", "task": task, "period": "10 min", **fields}
 
 
-def flat(task: str = "hangout", duration: str = "4 h", **sections: Any) -> dict[str, Any]:
+def flat(task="hangout", duration="4 h", **sections):
     return home_with([policy(task, rooms=7, every="1 h")], duration, **sections)
 
 
-def short(task: str) -> dict[str, Any]:
+def short(task):
     """A task of ours whose lives last a day."""
     content = load_task(task).model_dump(exclude_unset=True)
     content["scenario"]["simulation"]["duration"] = "1 d"
     return content
 
 
-def play(env: Any, seed: int | None = None, steps: int = 10**6) -> Iterator[tuple[Any, ...]]:
+def play(env, seed: int | None = None, steps=10**6) -> Iterator[tuple[Any, ...]]:
     """Let a policy that is drawn at random act; yield what `step` returns."""
     observation, info = env.reset(seed=seed)
     random = np.random.default_rng(0)
@@ -66,7 +66,7 @@ def test_stable_baselines_has_no_complaint():
     checker.check_env(RobotEnv("hangout", SHORT), skip_render_check=True)
 
 
-def two_robots() -> dict[str, Any]:
+def two_robots():
     robots = {
         name: {"start": [1.0 + n, 3.0], "behaviors": [policy(rooms=7)]}
         for n, name in enumerate(("astro", "rosie"))
@@ -222,7 +222,7 @@ def test_truth_is_told_only_if_asked_for():
 
 
 def test_same_seed_is_the_same_episode_in_any_number_of_environments():
-    settings: dict[str, Any] = {"task": load_task("hangout")}
+    settings = {"task": load_task("hangout")}
     few, many = VectorRobotEnv(2, SHORT, **settings), VectorRobotEnv(3, SHORT, **settings)
     first, second = few.reset(seed=5)[0], many.reset(seed=5)[0]
     for step in range(60):
@@ -312,7 +312,7 @@ def test_policies_from_files_repeat_the_episode(tmp_path):
     stored = fleet2d.run(content)
     env = RobotEnv(flat(duration="8 h"))
     observation, info = env.reset(seed=1, options={"seed": 4})
-    model: Any = copy.copy(env.present.policy("astro"))
+    model = copy.copy(env.present.policy("astro"))
     object.__setattr__(model, "file", path)
     truncated = False
     while not truncated:
@@ -322,7 +322,7 @@ def test_policies_from_files_repeat_the_episode(tmp_path):
     assert stored.tables["events"].num_rows > 5
 
 
-def scores_of_rooms(*names: str) -> bytes:
+def scores_of_rooms(*names):
     """An ONNX file that prefers rooms where some columns are low, and to rest least."""
     pytest.importorskip("onnx", reason="needs onnx")
     pytest.importorskip("onnxruntime", reason="needs the extra onnx")
@@ -375,7 +375,7 @@ def test_discount_is_by_time():
 @pytest.mark.parametrize("task", TASKS)
 def test_task_draws_homes_apart_for_each_split(task):
     random = np.random.default_rng(0)
-    splits: tuple[Split, ...] = get_args(Split)
+    splits = get_args(Split)
     homes = [
         {load_task(task).draw(random, split)["floorplan.seed"] for _ in range(50)}
         for split in splits

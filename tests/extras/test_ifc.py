@@ -1,6 +1,5 @@
 import math
 from pathlib import Path
-from typing import Any
 
 import pytest
 import shapely
@@ -18,7 +17,7 @@ Box = tuple[float, float, float, float]
 class Model:
     """An IFC model of boxes, written by ifcopenshell's own functions in millimetres."""
 
-    def __init__(self, storeys: dict[str, float], schema: str = "IFC4", turn: float = 0.0) -> None:
+    def __init__(self, storeys, schema="IFC4", turn=0.0):
         from ifcopenshell.api import aggregate, context, project, root, unit
 
         self.turn = turn
@@ -44,7 +43,7 @@ class Model:
             self._place(storey, storeys[name])
             aggregate.assign_object(self.file, products=[storey], relating_object=building)
 
-    def _place(self, element: Any, z: float) -> None:
+    def _place(self, element, z):
         import numpy as np
         from ifcopenshell.api import geometry
 
@@ -57,13 +56,13 @@ class Model:
 
     def add(
         self,
-        kind: str,
+        kind,
         box: Box,
         name: str | None = None,
-        storey: str = "Ground",
+        storey="Ground",
         z: tuple[float, float] = (0.0, 2.5),
-        **keys: Any,
-    ) -> None:
+        **keys,
+    ):
         """Add a box (x0, y0, x1, y1) [m] of a class; `z` is its bottom and top above the storey."""
         from ifcopenshell.api import aggregate, geometry, root, spatial
 
@@ -95,7 +94,7 @@ class Model:
         return path
 
 
-def flat(schema: str = "IFC4", spaces: bool = True) -> Model:
+def flat(schema="IFC4", spaces=True) -> Model:
     """Two rooms of 4 m x 4 m beside each other, and a storey above."""
     model = Model({"Up": 2.8, "Ground": 0.0, "Cellar": -2.5}, schema)
     for storey in ("Ground", "Up"):
@@ -189,7 +188,7 @@ def test_text_in_another_encoding_is_no_obstacle(tmp_path):
     assert plan == load_floorplan(path)
 
 
-def variation(k: int, folder: Path) -> tuple[Path, int, bool]:
+def variation(k, folder: Path) -> tuple[Path, int, bool]:
     """A model with gaps in its walls, or doors; perhaps an open plan, and several storeys."""
     home = small_home(k, turns=(0, 90, 17))
     is_open = k % 3 == 0

@@ -1,7 +1,5 @@
 """Networks in ONNX files: the shipped one gives the same beliefs, and wrong files are named."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ onnx = pytest.importorskip("onnx", reason="onnx isn't installed")
 pytest.importorskip("onnxruntime", reason="onnxruntime isn't installed")
 
 
-def graph_of(nodes: list[Any], weights: dict[str, Any], inputs: tuple[str, ...]) -> bytes:
+def graph_of(nodes, weights, inputs):
     """A model whose last node gives the output."""
     helper, numpy_helper = onnx.helper, onnx.numpy_helper
     shapes = {"features": ["bins", "places", 25], "places": ["places", 12], "other": ["n"]}
@@ -31,7 +29,7 @@ def graph_of(nodes: list[Any], weights: dict[str, Any], inputs: tuple[str, ...])
     return bytes(model.SerializeToString())
 
 
-def shipped() -> bytes:
+def shipped():
     """The shipped network as ONNX, without its trust, which depends on the gap."""
     weights = shipped_weights()
     node = onnx.helper.make_node
@@ -63,7 +61,7 @@ def shipped() -> bytes:
     return graph_of(nodes, {**arrays, **indices}, ("features", "places"))
 
 
-def beliefs(model: Any) -> Any:
+def beliefs(model):
     run = fleet2d.run(
         "bundled:paper",
         "simulation.duration=8 h",

@@ -28,7 +28,7 @@ CUBICASA = f"""<?xml version="1.0"?>{HEAD}<g id="Model" class="Model v1-1">
 </g></svg>"""
 
 
-def write(folder: Path, text: str) -> Path:
+def write(folder: Path, text) -> Path:
     path = folder / "plan.svg"
     path.write_text(text)
     return path
@@ -87,7 +87,7 @@ def test_one_sees_through_windows_between_rooms(tmp_path):
     assert load_floorplan(write(tmp_path, CUBICASA)).glass == ()
 
 
-def rooms_of(k: int, folder: Path) -> Path:
+def rooms_of(k, folder: Path) -> Path:
     """The home in pixels: walls as one path or several, rooms named by ids, classes or texts."""
     home = small_home(k, turns=(0, 90, 17))
     pixels = (100.0, 50.0, 37.8)[k % 3]
@@ -95,7 +95,7 @@ def rooms_of(k: int, folder: Path) -> Path:
     def at(point: tuple[float, float]) -> tuple[float, float]:
         return round(point[0] * pixels, 2), round(-point[1] * pixels, 2)
 
-    def path_of(box: tuple[float, float, float, float]) -> str:
+    def path_of(box: tuple[float, float, float, float]):
         return "M" + " L".join(f"{x} {y}" for x, y in map(at, home.corners(box))) + " Z"
 
     walls = [path_of(box) for box in home.walls]

@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.live.scenes import LIVE, place
@@ -30,14 +29,14 @@ def mosquitto(tmp_path):
         yield port, process
 
 
-def free_port() -> int:
+def free_port():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return int(free.getsockname()[1])
 
 
 @contextlib.contextmanager
-def mosquitto_at(port: int, tmp_path: Path) -> Iterator["subprocess.Popen[bytes]"]:
+def mosquitto_at(port, tmp_path: Path) -> Iterator["subprocess.Popen[bytes]"]:
     if BROKER is None:
         pytest.skip("mosquitto is not installed")
     config = tmp_path / "mosquitto.conf"
@@ -63,7 +62,7 @@ def broker(mosquitto):
 class Client:
     """A client that keeps what it hears."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port):
         from paho.mqtt.client import Client as MqttClient
         from paho.mqtt.enums import CallbackAPIVersion
 
@@ -77,10 +76,10 @@ class Client:
         self.mqtt.loop_start()
         assert self.is_on.wait(5)
 
-    def of(self, topic: str) -> list[str]:
+    def of(self, topic):
         return [payload for name, payload in self.heard if name == topic]
 
-    def close(self) -> None:
+    def close(self):
         self.mqtt.disconnect()
         self.mqtt.loop_stop()
         self.mqtt.on_message = self.mqtt.on_subscribe = None
@@ -126,7 +125,7 @@ def test_a_broker_passes_on_what_happens_and_what_arrives(broker):
 def test_goals_are_withdrawn_when_the_broker_is_gone(mosquitto):
     port, process = mosquitto
     peer = open_peer(f"mqtt://127.0.0.1:{port}/home")
-    told: list[str] = []
+    told = []
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=10, tell=told.append)
     thread = threading.Thread(target=bridge.run)
     thread.start()
@@ -147,7 +146,7 @@ def test_goals_are_withdrawn_when_the_broker_is_gone(mosquitto):
 
 def test_a_broker_that_is_missing_is_told_and_hears_the_run_once_it_is_there(tmp_path):
     port = free_port()
-    told: list[str] = []
+    told = []
     peer = open_peer(f"mqtt://127.0.0.1:{port}/home")
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=5, tell=told.append)
     thread = threading.Thread(target=bridge.run)
@@ -164,7 +163,7 @@ def test_a_broker_that_is_missing_is_told_and_hears_the_run_once_it_is_there(tmp
 @pytest.mark.slow
 def test_two_runs_with_one_prefix_are_told(broker):
     """Each applied what the other was sent, and neither said so."""
-    told: list[list[str]] = [[], []]
+    told = [[], []]
     address = f"mqtt://127.0.0.1:{broker}/home"
     bridges = [
         Bridge(fleet2d.Simulation(LIVE), [open_peer(address)], speed=10, tell=notes.append)
@@ -189,10 +188,10 @@ def test_an_unknown_host_of_a_broker_is_refused():
 # Brokers that misbehave
 
 
-def answering(answer: Callable[[int, bytes], bytes]) -> int:
+def answering(answer: Callable[[int, bytes], bytes]):
     """Return the port of a broker that answers each packet by its type and content."""
 
-    def serve(connection: socket.socket) -> None:
+    def serve(connection: socket.socket):
         with connection, contextlib.suppress(OSError):
             while head := connection.recv(1):
                 size, factor = 0, 1
@@ -202,7 +201,7 @@ def answering(answer: Callable[[int, bytes], bytes]) -> int:
                 content = connection.recv(size, socket.MSG_WAITALL) if size else b""
                 connection.sendall(answer(head[0] >> 4, content))
 
-    def accept() -> None:
+    def accept():
         while True:
             threading.Thread(target=serve, args=(listener.accept()[0],), daemon=True).start()
 
@@ -229,7 +228,7 @@ def test_a_broker_that_refuses_is_not_connected(code, reason):
 
 
 def test_a_broker_that_refuses_the_subscription_is_not_connected():
-    def answer(kind: int, content: bytes) -> bytes:
+    def answer(kind, content):
         return ACCEPTED if kind == CONNECT else b"\x90\x03" + content[:2] + b"\x80"
 
     with pytest.raises(InputError, match="refuses the subscription to lab/in/#: Unspecified error"):
@@ -245,9 +244,9 @@ def test_a_server_that_is_no_broker_is_told(answer, monkeypatch):
 
 
 def test_user_and_password_of_an_address_are_sent():
-    seen: list[bytes] = []
+    seen = []
 
-    def answer(kind: int, content: bytes) -> bytes:
+    def answer(kind, content):
         seen.append(content)
         return b"\x20\x02\x00\x05"
 
@@ -259,9 +258,9 @@ def test_user_and_password_of_an_address_are_sent():
 
 @pytest.mark.slow
 def test_a_broker_that_was_restarted_gets_all_that_it_keeps():
-    published: list[list[str]] = []
+    published = []
 
-    def answer(kind: int, content: bytes) -> bytes:
+    def answer(kind, content):
         if kind == CONNECT:
             published.append([])
             return ACCEPTED
@@ -276,7 +275,7 @@ def test_a_broker_that_was_restarted_gets_all_that_it_keeps():
             raise OSError
         return b"\x40\x02" + content[2 + size : 4 + size]
 
-    peer: Any = open_peer(f"mqtt://127.0.0.1:{answering(answer)}/lab")
+    peer = open_peer(f"mqtt://127.0.0.1:{answering(answer)}/lab")
     peer._client.reconnect_delay_set(1, 1)
     bridge = Bridge(fleet2d.Simulation(LIVE), [peer], speed=5)
     thread = threading.Thread(target=bridge.run)
@@ -303,7 +302,7 @@ def test_messages_before_the_run_begins_are_kept():
     reading = b'{"type": "reading", "sensor": "front_door", "on": true}'
     retained = b"\x00\x08lab/in/x" + reading
 
-    def answer(kind: int, content: bytes) -> bytes:
+    def answer(kind, content):
         if kind == CONNECT:
             return ACCEPTED
         if kind == SUBSCRIBE:

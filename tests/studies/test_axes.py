@@ -72,11 +72,6 @@ def test_a_folder_without_floor_plans_is_refused(tmp_path):
         axis(floorplans=str(tmp_path)).choices("home")
 
 
-def test_synthetic_homes_are_called_by_their_seeds():
-    assert [(5,), (6,)] == labels(axis(synthetic=2, first=5))
-    assert [(9,), (3,)] == labels(axis(synthetic=[9, 3]))
-
-
 def test_all_personas_are_those_that_come_with_fleet2d():
     axis_labels = labels(axis(personas="all", user="ana"))
     assert ("retired",) in axis_labels
@@ -97,11 +92,6 @@ def test_samples_are_the_same_at_each_call_and_within_range(method):
     assert all(0.2 <= speed <= 1.0 and 1 <= dwell <= 60 for speed, dwell, _ in axis_labels)
     assert {"fixed", "random"} == {order for *_, order in axis_labels}
     assert x_axis.choices("x")[0].changes[1][1].endswith(" min")
-
-
-def test_a_latin_hypercube_fills_every_eighth_of_a_range_once():
-    x_axis = axis(sample={"speed": {"key": SPEED, "low": 0, "high": 8}}, count=8)
-    assert list(range(8)) == sorted(int(speed) for (speed,) in labels(x_axis))
 
 
 def points(method, count, dimensions=2) -> list[tuple[int, ...]]:

@@ -24,26 +24,26 @@ class OtherSettings:
 
     @model_validator(mode="before")
     @classmethod
-    def _change(cls, data: Any) -> Any:
+    def _change(cls, data):
         return {**data, **cls.settings}
 
 
 class Late:
     """Waits for half a minute before its first plan."""
 
-    def start(self, actor: Actor) -> None:
-        super().start(actor)  # type: ignore[misc]
+    def start(self, actor: Actor):
+        super().start(actor)
         self.has_waited = False
 
     def decide(self, now: Situation) -> Plan | None:
         is_called = now.command is not None or not getattr(self, "answers", ())
         if self.has_waited or not is_called:
-            return super().decide(now)  # type: ignore[misc]
+            return super().decide(now)
         self.has_waited = True
         return now.plan().stay(LATE)
 
 
-def next_room(now: Situation, x: int, y: int) -> tuple[int, int]:
+def next_room(now: Situation, x, y) -> tuple[int, int]:
     """Return the middle of the room after that of a point [lattice]."""
     rooms = now.actor.reachable_rooms()
     at = now.home.plan.room_at(*now.home.plan.lattice.to_metres((x, y)).tolist())
@@ -139,7 +139,7 @@ class GreetTooNear(OtherSettings, Opportunistic):
 class VisitLate(Scheduled):
     """Sets out 30 s late."""
 
-    def _due(self, since: Any) -> Any:
+    def _due(self, since):
         yield from ((due + LATE, number) for due, number in super()._due(since - LATE))
 
 

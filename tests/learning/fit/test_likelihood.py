@@ -15,7 +15,6 @@ from fleet2d.learning.fit.likelihood import (
     Falling,
     Orientation,
     ProductLikelihood,
-    wilson,
 )
 from fleet2d.learning.fit.perception import DetectionLog
 
@@ -47,27 +46,6 @@ def test_the_fit_of_a_constant_is_the_share():
     fall = 2 * (37 * np.log(0.37 / p) + 63 * np.log(0.63 / (1 - p)))
     inside = p[fall <= 3.8414588]
     assert (top.low, top.high) == pytest.approx((inside[0], inside[-1]), abs=1e-4)
-
-
-@pytest.mark.slow
-def test_large_logs_give_the_true_parameters():
-    log = simulated(3, 80_000, bearing=True, turned=True)
-    factors = [
-        Constant("top", len(log)),
-        Falling("distance", log.distance),
-        Falling("bearing", log.bearing),
-        Orientation(log.orientation),
-    ]
-    likelihood = ProductLikelihood(factors, log.detected)
-    best = likelihood.fit()
-    index = 0
-    for factor in factors:
-        for i, name in enumerate(factor.names):
-            assert TRUE[name] == pytest.approx(factor.natural(i, best.theta[index]), rel=0.05), name
-            index += 1
-    assert best.shares == pytest.approx(
-        shares(log.distance, log.bearing, log.orientation), abs=0.02
-    )
 
 
 def missed(logs: Iterable[DetectionLog], factors_of: Callable[[DetectionLog], Any]) -> Counter[str]:
@@ -137,10 +115,3 @@ def test_an_interval_that_the_log_does_not_bound_is_open():
     top = likelihood.estimates(likelihood.fit())["top"]
     assert top.high is None
     assert 0.98 < (top.low or 0) < 0.995  # 300 of 300: exp(-1.92 / 300)
-
-
-def test_wilson_intervals_stay_within_0_and_1():
-    none, every = wilson(0, 20), wilson(20, 20)
-    assert (0.0, 1.0) == (none.low, every.high)
-    assert none.high == pytest.approx(1 - (every.low or 0))
-    assert 0.1611 == pytest.approx(none.high, abs=1e-4)

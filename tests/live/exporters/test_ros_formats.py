@@ -4,7 +4,6 @@ import json
 import math
 import signal
 from collections import defaultdict
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from fleet2d.runs.robot_log import robot_log
 
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 BEGIN_NS = 1_767_571_200 * 1_000_000_000  # 2026-01-05T00:00, taken as UTC
-Messages = dict[str, list[tuple[int, Any]]]
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ import importlib
 import subprocess
 import sys
 import textwrap
-from typing import Any
 
 import numpy as np
 import pytest
@@ -126,7 +125,7 @@ def test_a_node_of_ros_hears_and_drives_a_run(tmp_path):
     """
     (tmp_path / "lab.yaml").write_text(textwrap.dedent(scene))
     command = [sys.executable, "-m", "fleet2d", "live", "lab.yaml", "--with", "ros2:///jazzy"]
-    live: Any = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    live = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     try:
         heard = subprocess.run(
             [sys.executable, "-c", LISTENER],

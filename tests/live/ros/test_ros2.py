@@ -46,7 +46,7 @@ _ports = iter(range(17447 + os.getpid() % 1000, 65535))
 class Program:
     """A program of ROS beside a run: what it hears by topic, and goals that it sends."""
 
-    def __init__(self, port: int, distribution: str) -> None:
+    def __init__(self, port, distribution):
         from fleet2d.live.ros.zenoh_node import ZenohNode
 
         self.node = ZenohNode(RosTypes(distribution), port=port)
@@ -57,7 +57,7 @@ class Program:
             keep = self.heard.setdefault(name, []).append
             self.node.subscribe(name, of, keep, pytest.fail, LATCHED)
 
-    def wait_for(self, topic: str, count: int = 1) -> dict[str, Any]:
+    def wait_for(self, topic, count=1):
         until = time.monotonic() + 20
         while len(self.heard[topic]) < count:
             assert time.monotonic() < until, f"nothing on {topic}"
@@ -69,7 +69,7 @@ class Program:
         at = self.wait_for("/astro/odom")["pose"]["pose"]["position"]
         return at["x"], at["y"]
 
-    def send(self, x: float, y: float, frame: str = "map") -> tuple[bool, Any]:
+    def send(self, x, y, frame="map") -> tuple[bool, Any]:
         name = np.frombuffer(uuid.uuid4().bytes, np.uint8)
         pose = {"position": {"x": x, "y": y}, "orientation": {"w": 1.0}}
         stamped = {"header": {"frame_id": frame}, "pose": pose}
@@ -77,11 +77,11 @@ class Program:
         answer = self.node.call(f"{ACTION}/send_goal", f"{NAVIGATE}_SendGoal", request)
         return answer["accepted"], name
 
-    def result(self, name: Any) -> dict[str, Any]:
+    def result(self, name):
         request = {"goal_id": {"uuid": name}}
         return self.node.call(f"{ACTION}/get_result", f"{NAVIGATE}_GetResult", request, 20)
 
-    def cancel(self, name: Any) -> int:
+    def cancel(self, name):
         request = {"goal_info": {"goal_id": {"uuid": name}}}
         answer = self.node.call(f"{ACTION}/cancel_goal", "action_msgs/srv/CancelGoal", request)
         return int(answer["return_code"])
@@ -90,9 +90,7 @@ class Program:
 class Beside:
     """A run in a thread, and a program beside it."""
 
-    def __init__(
-        self, distribution: str = "jazzy", out: Path | None = None, **options: Any
-    ) -> None:
+    def __init__(self, distribution="jazzy", out: Path | None = None, **options):
         port = next(_ports)
         robot = LIVE["robots"]["astro"] | {"battery": BATTERY}
         simulation = LIVE["simulation"] | {"step": "50 ms", "duration": "10 min"}
@@ -107,7 +105,7 @@ class Beside:
     def __enter__(self) -> "Beside":
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         self.end()
         self.program.node.close()
 
@@ -149,7 +147,7 @@ def test_a_program_that_comes_late_hears_all_topics(beside):
 
 
 def test_clocks_come_before_the_stamps_of_their_step_and_count_up(beside):
-    def stamp(fields: Any) -> int:
+    def stamp(fields):
         return int(fields["sec"]) * 10**9 + int(fields["nanosec"])
 
     times = [stamp(m["clock"]) for m in beside.program.heard["/clock"]]
@@ -277,7 +275,7 @@ def test_open_goals_end_with_the_run_which_stores_what_was_taken(tmp_path):
         program = both.program
         program.wait_for("/clock", 5)
         _, name = program.send(*place("bathroom_1"))
-        answers: list[Any] = []
+        answers = []
         waiting = threading.Thread(target=lambda: answers.append(program.result(name)))
         waiting.start()
         time.sleep(0.5)
@@ -314,7 +312,7 @@ def test_a_robot_that_isnt_there_is_told():
 
 
 def test_a_speed_that_ros_cant_follow_is_told():
-    told: list[str] = []
+    told = []
     peer = Ros2Peer("127.0.0.1", next(_ports))
     simulation = fleet2d.Simulation(LIVE, "simulation.duration=2 s")
     Bridge(simulation, [peer], speed=50, tell=told.append).run()
@@ -349,7 +347,7 @@ def test_a_router_of_another_machine_that_is_missing_is_told_and_found_once_it_i
     router = zenoh_router(f"tcp/127.0.0.2:{port}")
     there = ZenohNode(RosTypes("jazzy"), "127.0.0.2", port)
     assert not there.notes
-    heard: list[dict[str, Any]] = []
+    heard = []
     there.subscribe("/clock", TOPICS["/clock"], heard.append, pytest.fail)
     publish = here.publisher("/clock", TOPICS["/clock"])
     until = time.monotonic() + 20
@@ -361,7 +359,7 @@ def test_a_router_of_another_machine_that_is_missing_is_told_and_found_once_it_i
     assert heard
 
 
-def zenoh_router(endpoint: str) -> Any:
+def zenoh_router(endpoint):
 
     import zenoh
 
