@@ -185,10 +185,10 @@ const Way& MeetingSearch::way_of(Timelines& timelines, i64 body, i64 first, i64 
 }
 
 i64 MeetingSearch::first_step(Timelines& timelines, i64 row, i64 other, const KnownMeeting& wanted) {
-    KnownMeeting& known = known_[number_of(row * timelines.bodies() + other)];
+    auto& [known, before] = known_[number_of(row * timelines.bodies() + other)];
+    if (!known.has_limits_of(wanted)) std::swap(known, before);
     const bool is_same = known.changes == wanted.changes && known.other_changes == wanted.other_changes &&
-                         known.near == wanted.near && known.hard == wanted.hard && known.counts == wanted.counts &&
-                         known.first <= wanted.first;
+                         known.has_limits_of(wanted) && known.first <= wanted.first;
     if (is_same && known.step >= wanted.first) return known.step < wanted.end ? known.step : -1;
     if (is_same && known.step < 0 && wanted.end <= known.end) return -1;
     const bool goes_on = is_same && known.step < 0 && wanted.first <= known.end;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <optional>
 
@@ -113,13 +114,19 @@ private:
         i64 changes = -1, other_changes = -1;
         i64 near = 0, hard = 0, counts = 0;
         i64 first = 0, end = 0, step = -1;
+
+        bool has_limits_of(const KnownMeeting& other) const {
+            return near == other.near && hard == other.hard && counts == other.counts;
+        }
     };
 
     const Way& way_of(Timelines& timelines, i64 body, i64 first, i64 end);
     i64 first_step(Timelines& timelines, i64 row, i64 other, const KnownMeeting& wanted);
 
     std::vector<KnownWay> ways_;
-    std::vector<KnownMeeting> known_;  // of body b and other o: number b * bodies + o
+    // Of body b and other o: number b * bodies + o. The distances of a pair alternate between two: those that it keeps,
+    // and those at which it stops at the last moment.
+    std::vector<std::array<KnownMeeting, 2>> known_;
 };
 
 }  // namespace fleet2d
