@@ -27,6 +27,8 @@ from fleet2d.kernels import (
 )
 
 CLOSED = -1
+# Cells to each side among which the nearest open one is looked for first.
+NEAR_CELLS = 8
 
 
 class CostmapSettings(Settings):
@@ -188,7 +190,7 @@ def route_by_cost(
     if part < 0:
         return None
     cells = space.part_of_cell == part
-    costs = np.where(cells & (cost >= 0), np.minimum(cost, MAX_COST), CLOSED).astype(np.int32)
+    costs = np.where(cells, cost.clip(CLOSED, MAX_COST), CLOSED).astype(np.int32, copy=False)
     last = _nearest(space, costs >= 0, goal)
     if cost[goal[1] // SUB, goal[0] // SUB] < 0 or last is None:
         return None
@@ -213,10 +215,10 @@ def closed_cells_around(
     space: Space, cost: NDArray[np.signedinteger], at: tuple[int, int]
 ) -> Bool | None:
     """Return the closed cells around a place, bool (rows, columns); None for an open place."""
-    closed = (space.part_of_cell >= 0) & (cost < 0)
     row, column = at[1] // SUB, at[0] // SUB
-    if not closed[row, column]:
+    if space.part_of_cell[row, column] < 0 or cost[row, column] >= 0:
         return None
+    closed = (space.part_of_cell >= 0) & (cost < 0)
     part = label_parts(closed, diagonal=False)
     return part == part[row, column]
 
@@ -226,9 +228,15 @@ def _nearest(space: Space, is_open: Bool, at: tuple[int, int]) -> tuple[int, int
     row, column = at[1] // SUB, at[0] // SUB
     if is_open[row, column]:
         return row, column
-    cells = cells_of(is_open)
-    if len(cells) == 0:
-        return None
-    away = space.plan.lattice.squared_distances(cells, at)
-    row, column = cells[int(np.argmin(away))].tolist()
-    return row, column
+    for reach in (NEAR_CELLS, sum(is_open.shape)):
+        low = max(row - reach, 0), max(column - reach, 0)
+        window = is_open[low[0] : row + reach + 1, low[1] : column + reach + 1]
+        cells = cells_of(window) + np.array(low)
+        if len(cells) == 0:
+            continue
+        away = space.plan.lattice.squared_distances(cells, at)
+        nearest = int(np.argmin(away))
+        if away[nearest] <= (reach * SUB) ** 2:  # all beyond the window are farther
+            row, column = cells[nearest].tolist()
+            return row, column
+    return None
