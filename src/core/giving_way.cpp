@@ -4,12 +4,15 @@
 
 #include "fields.hpp"
 #include "grid.hpp"
+#include "headings.hpp"
 
 namespace fleet2d {
 namespace {
 
-constexpr i64 FIRST_ASIDE = 12;   // cells to each side at which it first looks for places
-constexpr i64 STRAIGHT_STEP = 5;  // of `walking_distance`, to the side of a cell
+constexpr i64 FIRST_ASIDE = 12;           // cells to each side at which it first looks for places
+constexpr i64 STRAIGHT_STEP = 5;          // of `walking_distance`, to the side of a cell
+constexpr i64 DIRECTIONS = 8;             // in which a body passes another one
+constexpr std::size_t POINTS_BESIDE = 3;  // of those that are tried, after the nearest
 
 std::size_t nth(i64 i) { return static_cast<std::size_t>(i); }
 
@@ -81,6 +84,30 @@ Moment rest_at(Legs& legs, const Moment& now, const TrackPiece& track, i64 stop,
     Moment then = legs.turn(now, turn, body.turn_rate);
     stay_until(legs, then, std::max(since, next_multiple(then.time, body.beat)));
     return then;
+}
+
+i64 squared_distance_of(Point a, Point b) { return (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y); }
+
+// The points in the room of a body by which another one passes it, the nearest but one first.
+std::vector<Point> points_beside(Timelines& timelines, i64 row, i64 step, const BodyInWay& in_way) {
+    const BodyPose middle = timelines.pose(in_way.other, step), pose = timelines.pose(row, step);
+    const auto room_of = [&](Point place) -> i64 {
+        const GridCell cell{floor_div(place.y, SUB), floor_div(place.x, SUB)};
+        return is_inside(in_way.room_of_place.shape, cell) ? at(in_way.room_of_place, cell) : -1;
+    };
+    const i64 room = room_of({middle.x, middle.y});
+    std::vector<Point> points;
+    for (i64 i = 0; i < DIRECTIONS; ++i) {
+        const i64 heading = i * TURN / DIRECTIONS;
+        const Point point{middle.x + floor_div(in_way.distance * cosine(heading), UNIT),
+                          middle.y + floor_div(in_way.distance * sine(heading), UNIT)};
+        if (room_of(point) == room && in_way.can_get(point)) points.push_back(point);
+    }
+    const auto away = [&](Point point) { return squared_distance_of(point, {pose.x, pose.y}); };
+    std::ranges::stable_sort(points, {}, away);
+    if (!points.empty()) points.erase(points.begin());
+    if (points.size() > POINTS_BESIDE) points.resize(POINTS_BESIDE);
+    return points;
 }
 
 // From a place to which a body stepped aside, go on with the first stop after a moment.
@@ -169,16 +196,16 @@ std::optional<Detour> way_after_a_wait(Timelines& timelines, const KnownWays& wa
 }
 
 std::optional<Detour> way_by_a_place(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step,
-                                     i64 met, View<const i64, 2> places, View<const i64> waits, i64 rests,
+                                     i64 met, const std::vector<Point>& places, View<const i64> waits, i64 rests,
                                      const Distances& distances) {
     const i64 step_us = timelines.step_us();
     const Moment now = moment_of(timelines, body.row, step);
     const TrackPiece* track = followed(timelines, body.row);
     const auto is_free = [&](const Legs& legs) { return !ways.meeting(body.row, track_of(legs), distances); };
-    for (i64 i = 0; i < places.size(); ++i) {
+    for (const Point place : places) {
         Legs there;
         there.mark(now);
-        const auto arrived = body.go(there, now, {places(i, 0), places(i, 1)}, {});
+        const auto arrived = body.go(there, now, place, {});
         if (!arrived || (rests > 0 && !is_free(there))) continue;
         const i64 arrives = -floor_div(-arrived->time, step_us);
         const auto goes_on_after = [&](i64 wait) -> std::optional<Detour> {
@@ -198,6 +225,27 @@ std::optional<Detour> way_by_a_place(Timelines& timelines, const KnownWays& ways
         if (auto detour = goes_on_after(rests)) return detour;
     }
     return {};
+}
+
+bool takes_stop(Timelines& timelines, const Yielder& body, i64 step, i64 met, i64 other, i64 near, i64 end) {
+    if (!rests(timelines, other, step, end)) return false;
+    const TrackPiece* track = followed(timelines, body.row);
+    if (!track) return false;
+    const i64 next = next_stop(*track, (met + 1) * timelines.step_us(), body.can_stand);
+    const Moment stop = row_of(*track, next < 0 ? length_of(*track) - 1 : next);
+    const BodyPose stands = timelines.pose(other, step);
+    return squared_distance_of({stop.x, stop.y}, {stands.x, stands.y}) < near * near;
+}
+
+std::optional<Detour> way_past(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step, i64 met,
+                               const BodyInWay& in_way, View<const i64> waits, const Distances& distances, i64 end) {
+    if (waits.size() > 0 && !rests(timelines, in_way.other, step, end)) {
+        if (auto detour = way_after_a_wait(timelines, ways, body.row, step, waits, distances)) return detour;
+    }
+    if (takes_stop(timelines, body, step, met, in_way.other, in_way.near, end)) return {};
+    constexpr i64 at_once[] = {0};
+    return way_by_a_place(timelines, ways, body, step, met, points_beside(timelines, body.row, step, in_way),
+                          {at_once, {1}}, 0, distances);
 }
 
 std::optional<Detour> way_round(Timelines& timelines, const Yielder& body, i64 step, i64 met,
@@ -302,6 +350,23 @@ std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end
         }
         if (is_last || static_cast<i64>(places.size()) == search.most) return places;
     }
+}
+
+std::optional<Detour> way_aside(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step, i64 met,
+                                const AsideSearch& aside, View<const i64> waits, i64 rests,
+                                const Distances& distances) {
+    std::vector<Point> tried;
+    const Point from = aside.from();
+    for (const i64 within : {aside.near, aside.far}) {
+        const Search search{within, aside.spacing, aside.most};
+        auto places = places_aside(timelines, body.row, step, step + rests, aside.cells, from, search, aside.reach);
+        if (within != aside.near && places == tried) break;
+        if (auto detour = way_by_a_place(timelines, ways, body, step, met, places, waits, rests, distances)) {
+            return detour;
+        }
+        tried = std::move(places);
+    }
+    return {};
 }
 
 std::vector<Disc> standing(Timelines& timelines, i64 row, i64 step, i64 steps, View<const i64> reach) {

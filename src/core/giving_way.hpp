@@ -56,8 +56,26 @@ std::optional<Detour> way_after_a_wait(Timelines& timelines, const KnownWays& wa
 // `met` in which somebody would be in its way. Where it could stay for as long as ways are known, but is free after
 // none of the waits, it stays for `rests` steps; 0: it doesn't, and looks at the whole way only.
 std::optional<Detour> way_by_a_place(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step,
-                                     i64 met, View<const i64, 2> places, View<const i64> waits, i64 rests,
+                                     i64 met, const std::vector<Point>& places, View<const i64> waits, i64 rests,
                                      const Distances& distances);
+
+// Whether another body stays until the step `end` where a body wants to stop next after the step `met`: nearer to that
+// stop than `near`.
+bool takes_stop(Timelines& timelines, const Yielder& body, i64 step, i64 met, i64 other, i64 near, i64 end);
+
+// A body in the way of another one, and where that one may stand beside it.
+struct BodyInWay {
+    i64 other;     // the body in the way
+    i64 near;      // distance of the middles below which it takes a stop of the other one [lattice units]
+    i64 distance;  // at which the other one passes it [lattice units]
+    View<const i16, 2> room_of_place;    // -1 for none
+    std::function<bool(Point)> can_get;  // whether the other one can get to a point
+};
+
+// The way past a body: after the first of some waits that lets it, if that one doesn't stay until the step `end`; else
+// by a point beside it, unless it takes the next stop.
+std::optional<Detour> way_past(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step, i64 met,
+                               const BodyInWay& in_way, View<const i64> waits, const Distances& distances, i64 end);
 
 // The way round some discs to the first stop after the moment `met`, from which it goes on. If that stop is taken by a
 // disc, it stops at the place that `beside` returns instead; nothing if that is none.
@@ -85,6 +103,20 @@ struct Search {
 // as `reach` (bodies,) to them in the steps from `step` to `end`.
 std::vector<Point> places_aside(Timelines& timelines, i64 row, i64 step, i64 end, const Cells& cells, Point from,
                                 const Search& search, View<const i64> reach);
+
+// Where a body looks for places to step aside to.
+struct AsideSearch {
+    Cells cells;
+    std::function<Point()> from;  // where it begins to look
+    i64 near, far;                // cells to each side: first within the near ones
+    i64 spacing, most;            // see Search
+    View<const i64> reach;        // (bodies,), how near others may come to a place
+};
+
+// The way aside and back: that by the first place nearby from which it may go on, else by one farther away; see
+// `way_by_a_place`.
+std::optional<Detour> way_aside(Timelines& timelines, const KnownWays& ways, const Yielder& body, i64 step, i64 met,
+                                const AsideSearch& aside, View<const i64> waits, i64 rests, const Distances& distances);
 
 // Where others stand for so many steps from a step on, or else from the end of them on: by body, the middle and the
 // distance in `reach` (bodies,).

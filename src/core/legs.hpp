@@ -57,6 +57,11 @@ public:
     Moment settle(Moment now, Point at, i64 heading, f64 speed, f64 turn_rate);
 
     i64 size() const { return static_cast<i64>(rows_.size()); }
+    // The last breakpoint of at least one.
+    Moment last() const {
+        const auto& [time, x, y, heading, away] = rows_.back();
+        return {time, x, y, heading, away};
+    }
     // All breakpoints, (n, 5).
     Array<i64, 2> rows() const;
     // One column of them.

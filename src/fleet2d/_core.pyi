@@ -1795,7 +1795,7 @@ class Timelines:
         Return whether a body doesn't leave its place in the steps from `first` to `end` - 1.
         """
 
-    def way_after_a_wait(self, row: int, step: int, waits: numpy.typing.NDArray[numpy.int64], distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
+    def way_after_a_wait(self, row: int, step: int, waits: numpy.typing.NDArray[numpy.int64], distances: tuple[Any, ...], end: int) -> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None:
         """
         Return how a body goes on after the first wait that lets it.
 
@@ -1807,11 +1807,11 @@ class Timelines:
             end: One past the last step in which it must meet nobody.
 
         Returns:
-            Breakpoints from now on, int64 (n, 5), and how much later they continue the track: see `Continued`. None if it is
-            free after no wait.
+            Breakpoints from now on, the last of them, and how much later they continue the track: see `Continued`. None if
+            it is free after no wait.
         """
 
-    def way_by_a_place(self, body: tuple[Any, ...], step: int, met: int, places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], rests: int, distances: tuple[Any, ...], end: int) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
+    def way_by_a_place(self, body: tuple[Any, ...], step: int, met: int, places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], rests: int, distances: tuple[Any, ...], end: int) -> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None:
         """
         Return how a body goes on by the first place that lets it.
 
@@ -1830,7 +1830,56 @@ class Timelines:
             As `way_after_a_wait`.
         """
 
-    def way_round(self, body: tuple[Any, ...], step: int, met: int, discs: numpy.typing.NDArray[numpy.int64], beside: Callable[[int, int], tuple[int, int] | None]) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
+    def way_past(self, body: tuple[Any, ...], step: int, met: int, in_way: tuple[Any, ...], waits: numpy.typing.NDArray[numpy.int64], distances: tuple[Any, ...], end: int) -> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None:
+        """
+        Return how a body goes on past another one, later or by a point beside it.
+
+        Args:
+            body: Its row, how it goes there, and how it can stand: see `Yielder`.
+            step: The present step.
+            met: The step in which the other one would be in its way.
+            in_way: The other one, and where it may pass it: see `BodyInWay`.
+            waits: int64 (n,), steps for which it waits first, unless the other one stays.
+            distances: What it keeps from all bodies, (1, bodies) each.
+            end: One past the last step in which it must meet nobody, and up to which the other one stays.
+
+        Returns:
+            As `way_after_a_wait`.
+        """
+
+    def way_aside(self, body: tuple[Any, ...], step: int, met: int, aside: tuple[Any, ...], waits: numpy.typing.NDArray[numpy.int64], rests: int, distances: tuple[Any, ...], end: int) -> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None:
+        """
+        Return how a body steps aside and comes back, by a place nearby or else one farther away.
+
+        Args:
+            body: Its row, how it goes there, and how it can stand: see `Yielder`.
+            step: The present step.
+            met: The step in which somebody would be in its way.
+            aside: Where it looks for places: see `AsideSearch`.
+            waits: int64 (n,), steps for which it stays at a place.
+            rests: See `way_by_a_place`; for so many steps nobody may come near to a place.
+            distances: What it keeps from all bodies, (1, bodies) each.
+            end: One past the last step in which it must meet nobody.
+
+        Returns:
+            As `way_after_a_wait`.
+        """
+
+    def takes_stop(self, row: int, space: Mesh, step: int, met: int, other: int, near: int, end: int) -> bool:
+        """
+        Return whether another body stays where a body wants to stop next.
+
+        Args:
+            row: The body.
+            space: Where its middle may be.
+            step: The present step.
+            met: The step after which it stops.
+            other: The other body.
+            near: How near to the stop that one must be [lattice].
+            end: One past the last step in which it must stay.
+        """
+
+    def way_round(self, body: tuple[Any, ...], step: int, met: int, discs: numpy.typing.NDArray[numpy.int64], beside: Callable[[int, int], tuple[int, int] | None]) -> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None:
         """
         Return how a body goes round others that stand, to its next stop.
 
@@ -1845,7 +1894,7 @@ class Timelines:
             As `way_after_a_wait`; None if there is no way or no place.
         """
 
-    def way_from_here(self, body: tuple[Any, ...], step: int, met: int, may_stop: Callable[[int, int], bool]) -> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None:
+    def way_from_here(self, body: tuple[Any, ...], step: int, met: int, may_stop: Callable[[int, int], bool]) -> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None:
         """
         Return how a body goes on that stops where it is, in place of its next stop.
 

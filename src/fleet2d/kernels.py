@@ -65,7 +65,18 @@ from numpy.typing import NDArray
 
 # All names of the core are names of this module; those below are used here, too.
 from fleet2d._core import *  # noqa: F403 - its stub lists them
-from fleet2d._core import NEVER, QUARTER, SINES, TURN, UNIT, About, Mesh, Routes, SightingColumn
+from fleet2d._core import (
+    NEVER,
+    QUARTER,
+    SINES,
+    TURN,
+    UNIT,
+    About,
+    Legs,
+    Mesh,
+    Routes,
+    SightingColumn,
+)
 
 Bool = NDArray[np.bool_]
 F32 = NDArray[np.float32]
@@ -467,6 +478,51 @@ class Yielder(NamedTuple):
     walk: Callable[..., I64 | None]
 
 
+class BodyInWay(NamedTuple):
+    """A body in the way of another one, and where that one may pass it.
+
+    Attributes:
+        other: The body in the way.
+        near: How near to a stop of the other one it must stand to take it [lattice].
+        distance: At which distance the other one passes it [lattice].
+        room_of_place: int16 (rows, columns), the room of each cell, -1 for none.
+        parts: int32 (triangles,), the part of each triangle of the space of the other one, or a
+            function that returns the part of a point.
+        part: The part in which the other one is.
+    """
+
+    other: int
+    near: int
+    distance: int
+    room_of_place: I16
+    parts: I32 | Callable[[int, int], int]
+    part: int
+
+
+class AsideSearch(NamedTuple):
+    """Where a body looks for places to step aside to.
+
+    Attributes:
+        part_of_cell: int32 (rows, columns), the part of its space of each cell.
+        part: Its part.
+        begin: Returns the point from which it goes there [lattice].
+        near_cells: How many cells to each side it looks first.
+        far_cells: And then.
+        spacing: It looks at every so many of them.
+        most: For how many places it looks.
+        reach: int64 (bodies,), how near the others may come to a place [lattice].
+    """
+
+    part_of_cell: I32
+    part: int
+    begin: Callable[[], tuple[int, int]]
+    near_cells: int
+    far_cells: int
+    spacing: int
+    most: int
+    reach: I64
+
+
 class Delay(NamedTuple):
     """By how much later a part of a track comes.
 
@@ -490,8 +546,8 @@ class Delay(NamedTuple):
         return max(time_us, self.edge_us + self.later_us)
 
 
-Continued = tuple[I64, list[tuple[int, int, int, int]]]
-"""Breakpoints from now on, int64 (n, 5), that continue a track, and the delays of its parts, one
+Continued = tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]]
+"""Breakpoints from now on that continue a track, the last of them, and the delays of its parts, one
 after the other: see `Delay`."""
 
 

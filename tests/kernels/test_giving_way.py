@@ -1,12 +1,22 @@
 """The ways by which a body gets round others, against trying one after the other."""
 
+import math
+
 import numpy as np
 import pytest
 from shapely import box
 from tests.meshed_homes import home_of
 from tests.reference import giving_way as slow
 
-from fleet2d.kernels import Breakpoints, Distances, Timelines, Yielder, next_stop
+from fleet2d.kernels import (
+    AsideSearch,
+    BodyInWay,
+    Breakpoints,
+    Distances,
+    Timelines,
+    Yielder,
+    next_stop,
+)
 
 SECOND = 10**6
 NEAR = 300
@@ -62,6 +72,13 @@ def scenes(count):
         yield random, timelines, tracks, step
 
 
+def rows_of(way):
+    """The breakpoints of a way, the last of which it names."""
+    rows = way[0].rows().tolist()
+    assert rows[-1] == list(way[1])
+    return rows
+
+
 def free_in(timelines, step):
     return lambda rows: timelines.meeting_on(0, breakpoints(rows), kept(3), step, END) == (-1, -1)
 
@@ -81,9 +98,9 @@ def test_a_body_goes_on_after_the_first_wait_that_lets_it():
         assert (expected is None) == (way is None)
         if way is not None and expected is not None:
             found += 1
-            assert way[0].tolist() == expected
+            assert rows_of(way) == expected
             later = (expected[1][0] - expected[0][0]) if len(expected) > 1 else 0
-            assert way[1] == [(now, now, later, slow.delayed(rest, now, pose, later)[1])]
+            assert way[2] == [(now, now, later, slow.delayed(rest, now, pose, later)[1])]
     assert 10 < found < 110
 
 
@@ -129,7 +146,7 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests):
         assert (expected is None) == (way is None)
         if way is not None:
             found += 1
-            assert way[0].tolist() == expected
+            assert rows_of(way) == expected
     assert 10 < found < 115
 
 
@@ -141,12 +158,107 @@ def test_a_body_that_stands_at_a_corner_stays_aside_as_no_way_leads_back():
     place = np.array([[900, 1200]])
     way = timelines.way_by_a_place(body, 2, 4, place, WAITS, 6, kept(1), END)
     assert way is not None
-    assert way[0].tolist() == [
+    assert rows_of(way) == [
         [2 * SECOND, 0, 0, 0, 0],
         [3 * SECOND + SECOND // 2, 900, 1200, 0, 0],
         [5 * SECOND, 900, 1200, 0, 0],
         [20 * SECOND, 900, 1200, 0, 0],
     ]
+
+
+def is_same_way(one, other):
+    if one is None or other is None:
+        return one is other
+    return rows_of(one) == rows_of(other) and one[1:] == other[1:]
+
+
+def test_a_body_takes_a_stop_where_it_stays():
+    random = np.random.default_rng(54)
+    taken = 0
+    for _, timelines, (rows, *_), step in scenes(120):
+        met = step + int(random.integers(0, 4))
+        until = step + int(random.integers(1, 9))
+        stop = slow.next_stop(rows.tolist(), (met + 1) * SECOND)
+        places = [timelines.pose(1, at)[:2] for at in range(step, until)]
+        away = math.dist(rows[stop, 1:3].tolist(), places[0])
+        near = int(away) + int(random.integers(-1, 3))
+        expected = len(set(places)) == 1 and away < near
+        assert timelines.takes_stop(0, MESH, step, met, 1, near, until) == expected
+        taken += expected
+    assert 10 < taken < 110
+
+
+@pytest.mark.parametrize("by_triangle", [True, False])
+def test_a_body_goes_past_another_one_later_or_by_a_point_beside_it(by_triangle):
+    found = {"later": 0, "beside": 0, "taken": 0, "none": 0}
+    rooms = np.repeat(np.array([[0, 1]], np.int16), 32, axis=1).repeat(64, axis=0)
+    rooms[:, :4] = -1
+    none = np.zeros(0, np.int64)
+    parts = np.zeros(len(MESH.triangles), np.int32) if by_triangle else lambda x, y: int(y > 3000)
+    for random, timelines, _, step in scenes(200):
+        met = step + 2
+        near = int(random.choice([350, 2000]))
+        distance = int(random.integers(300, 900))
+        until = step + 5
+        body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
+        middle, at = (timelines.pose(row, step)[:2] for row in (1, 0))
+        points = [
+            (x, y)
+            for x, y in slow.points_around(middle, distance)
+            if slow.room_of(rooms, x, y) == slow.room_of(rooms, *middle)
+            and 0 < x < 4096
+            and 0 < y < 4096
+            and (by_triangle or y <= 3000)
+        ]
+        points.sort(key=lambda point: math.dist(point, at))
+        waits = WAITS if random.integers(0, 2) else none
+        later = beside = None
+        if len(waits) and not timelines.rests(1, step, until):
+            later = timelines.way_after_a_wait(0, step, waits, kept(3), until)
+        is_taken = timelines.takes_stop(0, MESH, step, met, 1, near, until)
+        if not is_taken:
+            places = np.array(points[1:4], np.int64).reshape(-1, 2)
+            now = np.zeros(1, np.int64)
+            beside = timelines.way_by_a_place(body, step, met, places, now, 0, kept(3), until)
+        in_way = BodyInWay(1, near, distance, rooms, parts, 0)
+        way = timelines.way_past(body, step, met, in_way, waits, kept(3), until)
+        assert is_same_way(way, beside if later is None else later)
+        kind = "later" if later else "beside" if beside else "taken" if is_taken else "none"
+        found[kind] += 1
+    assert min(found.values()) > 3, found
+
+
+def test_parts_of_another_space_are_refused():
+    (_, timelines, _, step), *_ = scenes(1)
+    body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
+    parts = np.zeros(len(MESH.triangles) + 1, np.int32)
+    in_way = BodyInWay(1, 350, 400, np.zeros((64, 64), np.int16), parts, 0)
+    with pytest.raises(ValueError, match="parts must be a function"):
+        timelines.way_past(body, step, step + 1, in_way, WAITS, kept(3), step + 5)
+
+
+def test_a_body_steps_aside_nearby_or_else_farther_away():
+    found = {"near": 0, "far": 0, "none": 0}
+    for random, timelines, _, step in scenes(120):
+        met, until, rests = step + 2, step + 6, 5
+        parts = random.integers(0, 8, (64, 64)).clip(0, 1).astype(np.int32)
+        start = tuple(random.integers(700, 3000, 2).tolist())
+        reach = np.array([0, *random.integers(300, 2500, 2)])
+        near, far, spacing, most = int(random.integers(2, 8)), 20, 2, 3
+        body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
+        expected = None
+        kind = "none"
+        for name, within in (("near", near), ("far", far)):
+            search = within, spacing, most
+            places = timelines.places_aside(0, step, step + rests, parts, 1, start, search, reach)
+            if expected is None:
+                expected = timelines.way_by_a_place(body, step, met, places, WAITS, rests, kept(3), until)  # fmt: skip
+                kind = kind if expected is None else name
+        aside = AsideSearch(parts, 1, lambda at=start: at, near, far, spacing, most, reach)
+        way = timelines.way_aside(body, step, met, aside, WAITS, rests, kept(3), until)
+        assert is_same_way(way, expected)
+        found[kind] += 1
+    assert min(found.values()) > 3, found
 
 
 def random_rest(random):
@@ -178,8 +290,8 @@ def test_a_body_goes_round_others_and_beside_those_at_its_stop():
         now = [step * SECOND, *timelines.pose(0, step)]
         ways = slow.way_round(now, rows.tolist(), met, discs.tolist(), beside, walk, BEAT)
         way = timelines.way_round(body, step, met, discs, lambda *_, at=beside: at)
-        assert ways == (None if way is None else (way[0].tolist(), way[1]))
-        found[0 if way is None else len(way[1])] += 1
+        assert ways == (None if way is None else (rows_of(way), way[2]))
+        found[0 if way is None else len(way[2])] += 1
     assert min(found.values()) > 10, found
 
 
@@ -191,9 +303,9 @@ def test_a_body_goes_on_from_where_it_is_instead_of_a_stop():
         now = [step * SECOND, *timelines.pose(0, step)]
         ways = slow.way_from_here(now, rows.tolist(), met, walk, BEAT)
         way = timelines.way_from_here(body, step, met, lambda *_: True)
-        assert ways == (None if way is None else (way[0].tolist(), way[1]))
+        assert ways == (None if way is None else (rows_of(way), way[2]))
         assert timelines.way_from_here(body, step, met, lambda *_: False) is None
-        found[0 if way is None else len(way[1])] += 1
+        found[0 if way is None else len(way[2])] += 1
     assert min(found.values()) > 5, found
 
 

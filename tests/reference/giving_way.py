@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from fleet2d.kernels import CELL_CENTRE, SUB, walking_distance
+from fleet2d.kernels import CELL_CENTRE, SUB, TURN, UNIT, cosine, sine, walking_distance
 
 Row = list[int]
 """Time, x, y, heading, away."""
@@ -133,6 +133,22 @@ def places_aside(
             if steps[r, c] > 0 and clear:
                 found.append((int(steps[r, c]), r, c, tuple(at.tolist())))
     return [place for *_, place in sorted(found)[:most]]
+
+
+def points_around(middle, distance):
+    """Return the points at a distance from a point, in eight directions from +x on."""
+    headings = [i * TURN // 8 for i in range(8)]
+    return [
+        (middle[0] + distance * cosine(h) // UNIT, middle[1] + distance * sine(h) // UNIT)
+        for h in headings
+    ]
+
+
+def room_of(room_of_place, x, y):
+    """Return the room of a point, -1 outside of all cells."""
+    rows, columns = room_of_place.shape
+    is_inside = 0 <= y // SUB < rows and 0 <= x // SUB < columns
+    return int(room_of_place[y // SUB, x // SUB]) if is_inside else -1
 
 
 def first_free(candidates, is_free):

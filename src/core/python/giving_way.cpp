@@ -60,6 +60,45 @@ Yielder yielder_of(const YielderFields& fields) {
     return {row, turn_rate, beat, go, can_stand};
 }
 
+BodyInWay body_in_way_of(const BodyInWayFields& fields, const Mesh& space) {
+    const auto& [other, near, distance, rooms, parts, part] = fields;
+    for (const i64 units : {near, distance}) require(0 <= units && units < FARTHEST_POSE, "distances must be small");
+    const auto has_part = [rooms = rooms, part = part](Point at, const auto& part_at) {
+        return is_inside(rooms.shape, {floor_div(at.y, SUB), floor_div(at.x, SUB)}) && part_at(at) == part;
+    };
+    if (nb::isinstance<nb::callable>(parts)) {
+        const auto ask = [&parts = parts](Point at) { return nb::cast<i64>(parts(at.x, at.y)); };
+        return {other, near, distance, rooms, [=](Point at) { return has_part(at, ask); }};
+    }
+    View<const i32> part_of_triangle;
+    nb::object copy;
+    require(border::view_of(parts, part_of_triangle, copy) && part_of_triangle.size() == space.triangle_count(),
+            "parts must be a function, or int32 (triangles,)");
+    const auto look_up = [copy, part_of_triangle, &space](Point at) -> i64 {
+        return strictly_inside(space, at.x, at.y) ? part_of_triangle[locate(space, at.x, at.y)] : OUTSIDE;
+    };
+    return {other, near, distance, rooms, [=](Point at) { return has_part(at, look_up); }};
+}
+
+AsideSearch aside_search_of(const AsideSearchFields& fields) {
+    const auto& [parts, part, from, near, far, spacing, most, reach] = fields;
+    for (const i64 cells : {near, far}) require(0 <= cells && cells < FARTHEST_POSE, "near and far must be small");
+    require(0 < spacing && spacing < FARTHEST_POSE, "spacing must be small");
+    require(all_in_range(reach, 0, FARTHEST_POSE), "reach must be small");
+    const auto begin = [shape = parts.shape, &from = from] {
+        const auto [x, y] = nb::cast<std::pair<i64, i64>>(from());
+        require(is_inside(shape, {floor_div(y, SUB), floor_div(x, SUB)}), "from must return a point in a cell");
+        return Point{x, y};
+    };
+    return {{parts, part}, begin, near, far, spacing, most, reach};
+}
+
+std::vector<Point> points_of(View<const i64, 2> rows) {
+    std::vector<Point> points;
+    for (i64 i = 0; i < rows.size(); ++i) points.push_back({rows(i, 0), rows(i, 1)});
+    return points;
+}
+
 void bind_giving_way(nb::module_& m) {
     m.def(
         "next_stop",

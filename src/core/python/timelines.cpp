@@ -147,14 +147,15 @@ public:
         return found ? std::tuple(found->step, found->other) : std::tuple(i64{-1}, i64{-1});
     }
 
-    // Rows (n, 5) from the present one on, and how much later they continue the track.
+    // Breakpoints from the present one on, the last of them, and how much later they continue the track.
     using DelayFields = std::tuple<i64, i64, i64, i64>;
-    using DetourFields = std::optional<std::tuple<Array<i64, 2>, std::vector<DelayFields>>>;
-    static DetourFields fields_of(const std::optional<Detour>& detour) {
+    using DetourFields = std::optional<std::tuple<Legs, MomentRow, std::vector<DelayFields>>>;
+    static DetourFields fields_of(std::optional<Detour> detour) {
         if (!detour) return {};
         std::vector<DelayFields> delays;
         for (const auto& [after, since, later, edge] : detour->delays) delays.emplace_back(after, since, later, edge);
-        return std::tuple(detour->legs.rows(), delays);
+        const MomentRow end = plain(detour->legs.last());
+        return std::tuple(std::move(detour->legs), end, std::move(delays));
     }
 
     DetourFields way_after_a_wait(i64 row, i64 step, View<const i64> waits, const Distances& distances, i64 end) {
@@ -171,8 +172,47 @@ public:
         require(places.shape[1] == 2 && all_in_range(places, -FARTHEST_POSE + 1, FARTHEST_POSE),
                 "places must be (n, 2), within 2**29 of 0");
         const Yielder yielder = yielder_of(body);
-        return fields_of(fleet2d::way_by_a_place(timelines_, known_ways(step, end), yielder, step, met, places, waits,
-                                                 rests, distances));
+        return fields_of(fleet2d::way_by_a_place(timelines_, known_ways(step, end), yielder, step, met,
+                                                 points_of(places), waits, rests, distances));
+    }
+
+    DetourFields way_past(const YielderFields& body, i64 step, i64 met, const BodyInWayFields& in_way,
+                          View<const i64> waits, const Distances& distances, i64 end) {
+        const i64 row = std::get<0>(body);
+        check_detour(row, step, waits, distances, end);
+        check(row, met + 1);
+        require(step < end, "end must be after step");
+        check_known(std::get<0>(in_way), step);
+        const Yielder yielder = yielder_of(body);
+        return fields_of(fleet2d::way_past(timelines_, known_ways(step, end), yielder, step, met,
+                                           body_in_way_of(in_way, std::get<1>(body)), waits, distances, end));
+    }
+
+    DetourFields way_aside(const YielderFields& body, i64 step, i64 met, const AsideSearchFields& aside,
+                           View<const i64> waits, i64 rests, const Distances& distances, i64 end) {
+        const i64 row = std::get<0>(body);
+        check_detour(row, step, waits, distances, end);
+        check(row, met + 1);
+        require(0 <= rests && rests < FAR, "rests must be 0 or more steps");
+        require(std::get<7>(aside).size() == timelines_.bodies(), "reach must be (bodies,)");
+        for (i64 other = 0; other < timelines_.bodies(); ++other) {
+            check_known(other, step);
+            check(other, step + rests);
+        }
+        const Yielder yielder = yielder_of(body);
+        return fields_of(fleet2d::way_aside(timelines_, known_ways(step, end), yielder, step, met,
+                                            aside_search_of(aside), waits, rests, distances));
+    }
+
+    bool takes_stop(i64 row, const Mesh& space, i64 step, i64 met, i64 other, i64 near, i64 end) {
+        require(step < end, "end must be after step");
+        require(0 <= near && near < FAR, "near must be small");
+        check_begin(row, step);
+        check(row, met + 1);
+        check_known(other, step);
+        check(other, end);
+        const auto can_stand = [&space](Point at) { return strictly_inside(space, at.x, at.y); };
+        return fleet2d::takes_stop(timelines_, {row, 1.0, 1, {}, can_stand}, step, met, other, near, end);
     }
 
     DetourFields way_round(const YielderFields& body, i64 step, i64 met, View<const i64, 2> discs,
@@ -634,14 +674,14 @@ Args:
     end: One past the last step in which it must meet nobody.
 
 Returns:
-    Breakpoints from now on, int64 (n, 5), and how much later they continue the track: see `Continued`. None if it is
-    free after no wait.)")
+    Breakpoints from now on, the last of them, and how much later they continue the track: see `Continued`. None if
+    it is free after no wait.)")
         .def("way_by_a_place", &OwnedTimelines::way_by_a_place, "body"_a, "step"_a, "met"_a, "places"_a, "waits"_a,
              "rests"_a, "distances"_a, "end"_a,
              nb::sig("def way_by_a_place(self, body: tuple[typing.Any, ...], step: int, met: int, "
                      "places: numpy.typing.NDArray[numpy.int64], waits: numpy.typing.NDArray[numpy.int64], "
                      "rests: int, distances: tuple[typing.Any, ...], end: int) "
-                     "-> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None"),
+                     "-> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None"),
              R"(Return how a body goes on by the first place that lets it.
 
 Args:
@@ -657,11 +697,62 @@ Args:
 
 Returns:
     As `way_after_a_wait`.)")
+        .def("way_past", &OwnedTimelines::way_past, "body"_a, "step"_a, "met"_a, "in_way"_a, "waits"_a, "distances"_a,
+             "end"_a,
+             nb::sig("def way_past(self, body: tuple[typing.Any, ...], step: int, met: int, "
+                     "in_way: tuple[typing.Any, ...], waits: numpy.typing.NDArray[numpy.int64], "
+                     "distances: tuple[typing.Any, ...], end: int) "
+                     "-> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None"),
+             R"(Return how a body goes on past another one, later or by a point beside it.
+
+Args:
+    body: Its row, how it goes there, and how it can stand: see `Yielder`.
+    step: The present step.
+    met: The step in which the other one would be in its way.
+    in_way: The other one, and where it may pass it: see `BodyInWay`.
+    waits: int64 (n,), steps for which it waits first, unless the other one stays.
+    distances: What it keeps from all bodies, (1, bodies) each.
+    end: One past the last step in which it must meet nobody, and up to which the other one stays.
+
+Returns:
+    As `way_after_a_wait`.)")
+        .def("way_aside", &OwnedTimelines::way_aside, "body"_a, "step"_a, "met"_a, "aside"_a, "waits"_a, "rests"_a,
+             "distances"_a, "end"_a,
+             nb::sig("def way_aside(self, body: tuple[typing.Any, ...], step: int, met: int, "
+                     "aside: tuple[typing.Any, ...], waits: numpy.typing.NDArray[numpy.int64], rests: int, "
+                     "distances: tuple[typing.Any, ...], end: int) "
+                     "-> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None"),
+             R"(Return how a body steps aside and comes back, by a place nearby or else one farther away.
+
+Args:
+    body: Its row, how it goes there, and how it can stand: see `Yielder`.
+    step: The present step.
+    met: The step in which somebody would be in its way.
+    aside: Where it looks for places: see `AsideSearch`.
+    waits: int64 (n,), steps for which it stays at a place.
+    rests: See `way_by_a_place`; for so many steps nobody may come near to a place.
+    distances: What it keeps from all bodies, (1, bodies) each.
+    end: One past the last step in which it must meet nobody.
+
+Returns:
+    As `way_after_a_wait`.)")
+        .def("takes_stop", &OwnedTimelines::takes_stop, "row"_a, "space"_a, "step"_a, "met"_a, "other"_a, "near"_a,
+             "end"_a,
+             R"(Return whether another body stays where a body wants to stop next.
+
+Args:
+    row: The body.
+    space: Where its middle may be.
+    step: The present step.
+    met: The step after which it stops.
+    other: The other body.
+    near: How near to the stop that one must be [lattice].
+    end: One past the last step in which it must stay.)")
         .def("way_round", &OwnedTimelines::way_round, "body"_a, "step"_a, "met"_a, "discs"_a, "beside"_a,
              nb::sig("def way_round(self, body: tuple[typing.Any, ...], step: int, met: int, "
                      "discs: numpy.typing.NDArray[numpy.int64], "
                      "beside: collections.abc.Callable[[int, int], tuple[int, int] | None]) "
-                     "-> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None"),
+                     "-> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None"),
              R"(Return how a body goes round others that stand, to its next stop.
 
 Args:
@@ -676,7 +767,7 @@ Returns:
         .def("way_from_here", &OwnedTimelines::way_from_here, "body"_a, "step"_a, "met"_a, "may_stop"_a,
              nb::sig("def way_from_here(self, body: tuple[typing.Any, ...], step: int, met: int, "
                      "may_stop: collections.abc.Callable[[int, int], bool]) "
-                     "-> tuple[numpy.typing.NDArray[numpy.int64], list[tuple[int, int, int, int]]] | None"),
+                     "-> tuple[Legs, tuple[int, int, int, int, int], list[tuple[int, int, int, int]]] | None"),
              R"(Return how a body goes on that stops where it is, in place of its next stop.
 
 Args:

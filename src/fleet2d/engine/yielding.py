@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,10 +27,10 @@ from fleet2d.entities.behavior import Situation
 from fleet2d.entities.body import Bodies, Pose, Track
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.giving_way import plan_after, plan_along, plan_around, plan_here, yielder
-from fleet2d.entities.place import is_point, points_at_distance
+from fleet2d.entities.place import is_point
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.floorplan.lattice import LatticePoint
-from fleet2d.kernels import I64, SUB, Bool, Distances
+from fleet2d.kernels import I64, SUB, AsideSearch, BodyInWay, Bool, Distances
 from fleet2d.runtime.events import EventKind
 
 EndPlan = Callable[[int, int], None]
@@ -57,13 +58,12 @@ GIVES_UP = timedelta(minutes=2)
 PASSING_GAP_M = 0.02
 LEAST_GAP_M = 0.01
 # Places to step aside to: how far away they may be [m], the distance between them [cells], and how
-# many are tried; and the number of directions in which it passes somebody who stands.
+# many are tried.
 NEAR_M = 1.2
 FAR_M = 3.0
 ASIDE_CELLS = 4
 ASIDE_TRIES = 12
-VIAS = 8
-NO_WAIT = np.zeros(1, np.int64)
+NO_WAITS = np.zeros(0, np.int64)
 
 # Whose motion counts.
 OWN = 1
@@ -123,6 +123,7 @@ class Yielding(Watcher):
         # Robots that are late for each other take the same poses later, whose views are known.
         self._beat_us = self._step_us if len(self.rows) > 1 else 1
         self._ahead = self._steps(AHEAD)
+        self._free_for = self._steps(FREE_FOR)
         self._tries = np.array([self._steps(wait) for wait in WAITS], np.int64)
         self._tries_aside = np.array([self._steps(wait) for wait in WAITS_ASIDE], np.int64)
         self._waits: dict[int, GivenWay] = {}
@@ -135,6 +136,9 @@ class Yielding(Watcher):
         self._swapped: dict[tuple[int, int], int] = {}
         self._stuck: tuple[bool, ...] = ()
         self._distances: Distances | None = None
+        # What they keep without patience, and the pairs of robots that have swapped who goes first.
+        self._without_patience: tuple[list[tuple[int, int]], Distances] | None = None
+        self._strictest: tuple[I64, Distances] | None = None  # the leads that it is made from
         self.overlaps: dict[tuple[str, str], int] = {}
         if self.rows:
             self._set_up()
@@ -279,10 +283,12 @@ class Yielding(Watcher):
         if not self._rule.is_fixed:
             self._order()
             self._distances = None
+            self._without_patience = None
         stuck = tuple([_is_stuck(self._actors[row]) for row in self.rows])
         if stuck != self._stuck:
             self._stuck = stuck
             self._distances = None
+            self._without_patience = None
 
     def _present(self, step: int) -> Distances:
         """Return what the robots keep from all bodies at a step."""
@@ -305,11 +311,11 @@ class Yielding(Watcher):
 
     def _kept(self, step: int) -> Distances:
         """Return what the robots keep from all bodies at a step, if nobody decides before it."""
-        first = self._first_now(step)
-        lead = np.where(first, 0, self._ahead)
-        near = np.where(first, self._least, self._near)
-        hard = np.where(first, 0, self._hard)
-        counts = np.where(first, OWN, self._counts).astype(np.uint8)
+        usual = self._usual(step)
+        lead = usual.lead.copy()
+        near = usual.near.copy()
+        hard = usual.hard.copy()
+        counts = usual.counts.copy()
         for row in [row for row, pause in self._pauses.items() if pause.until > step]:
             i = self._number[row]
             lead[i, self._rows] = 0
@@ -329,10 +335,24 @@ class Yielding(Watcher):
                 lead[number] = -1
         return Distances(lead, near, hard, counts)
 
+    def _usual(self, step: int) -> Distances:
+        """Return what the robots keep from all bodies at a step without patience."""
+        swapped = self._swapped_at(step)
+        if self._without_patience is None or self._without_patience[0] != swapped:
+            first = self._first_now(step)
+            kept = Distances(
+                lead=np.where(first, 0, self._ahead),
+                near=np.where(first, self._least, self._near),
+                hard=np.where(first, 0, self._hard),
+                counts=np.where(first, OWN, self._counts).astype(np.uint8),
+            )
+            self._without_patience = swapped, kept
+        return self._without_patience[1]
+
     def _first_now(self, step: int) -> Bool:
         """Return which robots go before others at a step, bool (robots, bodies)."""
         first = self._first.copy()
-        for one, other in [pair for pair, until in self._swapped.items() if until > step]:
+        for one, other in self._swapped_at(step):
             row = self._number[one]
             first[row, other] = not first[row, other]
             row = self._number[other]
@@ -342,10 +362,17 @@ class Yielding(Watcher):
                 first[:, self.rows[number]] = False
         return first
 
+    def _swapped_at(self, step: int) -> list[tuple[int, int]]:
+        """Return the pairs of robots that have swapped who goes first, and still do at a step."""
+        return [pair for pair, until in self._swapped.items() if until > step]
+
     def _strict(self, step: int) -> Distances:
         """Return the distances at which robots stop at the last moment."""
-        lead = np.minimum(self._present(step).lead, 0)
-        return Distances(lead, self._least, self._nothing, self._alone)
+        lead = self._present(step).lead
+        if self._strictest is None or self._strictest[0] is not lead:
+            strict = Distances(np.minimum(lead, 0), self._least, self._nothing, self._alone)
+            self._strictest = lead, strict
+        return self._strictest[1]
 
     def _goes_first(self, row: int, other: int, step: int) -> bool:
         """Return whether a robot only has to stop before another one, and needn't yield."""
@@ -427,17 +454,10 @@ class Yielding(Watcher):
 
     def _by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
         """Return a plan that goes on later, or round bodies that stand; None if none is free."""
-        actor = self._actors[now.actor.row]
-        if not self._rests(other, now.step):
-            row = actor.row
-            continued = self._bodies.timelines.way_after_a_wait(
-                row, now.step, self._tries, self._politely[row], self._far(now)
-            )
-            if continued is not None:
-                return plan_along(now, actor.plan, continued)
-        plan = self._by_via(now, at, other)
+        plan = self._past(now, at, other, self._tries)
         if plan is not None:
             return plan
+        actor = self._actors[now.actor.row]
         standing = self._standing(now)
         seen = actor.state, actor.arrangement, self._stop_of(actor, at), standing.tobytes()
         last, where = self._looked_round.get(actor.row, (None, None))
@@ -451,21 +471,21 @@ class Yielding(Watcher):
         self._looked_round[actor.row] = now.step, None if around is not None else seen
         return None
 
-    def _by_via(self, now: Situation, at: int, other: int) -> Plan | None:
-        """Return a plan to pass a body that stands, by a point beside it; None without one."""
+    def _past(self, now: Situation, at: int, other: int, waits: I64) -> Plan | None:
+        """Return a plan to go on past a body, later or by a point beside it; None without one."""
         actor = self._actors[now.actor.row]
-        if self._is_taken(actor, other, now.step, at):
-            return None
+        number = self._number[actor.row]
+        in_way = BodyInWay(
+            other=other,
+            near=int(self._near[number, other]),
+            distance=3 * int(self._polite[number, other]) // 2,
+            room_of_place=actor.home.plan.room_of_place,
+            parts=actor.space.part_lookup,
+            part=actor.part,
+        )
         kept = self._politely[actor.row]
-        return self._by_places(now, at, self._beside(actor, other), NO_WAIT, 0, kept)
-
-    def _by_places(
-        self, now: Situation, at: int, places: I64, waits: I64, rests: int, kept: Distances
-    ) -> Plan | None:
-        """Return a plan to go on by one of some places: see `Timelines.way_by_a_place`."""
-        actor = self._actors[now.actor.row]
-        continued = self._bodies.timelines.way_by_a_place(
-            yielder(actor, self._beat_us), now.step, at, places, waits, rests, kept, self._far(now)
+        continued = self._bodies.timelines.way_past(
+            yielder(actor, self._beat_us), now.step, at, in_way, waits, kept, self._far(now)
         )
         return None if continued is None else plan_along(now, actor.plan, continued)
 
@@ -475,16 +495,8 @@ class Yielding(Watcher):
         if other not in self._number or not self._rests(row, now.step):
             return None
         theirs = Situation(self._actors[other], now.step, (), now.outputs)
-        plan = self._by_via(theirs, at, row)
+        plan = self._past(theirs, at, row, NO_WAITS)
         return None if plan is None else (theirs, self._noted(theirs, row, plan))
-
-    def _beside(self, actor: DecidingActor, other: int) -> I64:
-        """Return points by which a robot may pass a body that stands, the nearest but one first."""
-        near = 3 * int(self._polite[self._number[actor.row], other]) // 2
-        middle = self._actors[other].state.position
-        points = points_at_distance(actor, middle, near, VIAS)
-        nearest = sorted(points, key=lambda at: math.dist(at, actor.state.position))
-        return np.array(nearest[1:4], np.int64).reshape(-1, 2)
 
     def _aside(self, now: Situation, at: int, kept: Distances) -> Plan | None:
         """Return a plan to step aside and come back, by the nearest place; None without one.
@@ -493,23 +505,22 @@ class Yielding(Watcher):
         """
         actor = self._actors[now.actor.row]
         cell = actor.home.plan.lattice.cell
-        rests = self._steps(FREE_FOR)
-        reach = self._near[self._number[actor.row]] + SUB
-        places: I64 | None = None
-        for metres in (NEAR_M, FAR_M):
-            search = int(metres / cell), ASIDE_CELLS, ASIDE_TRIES
-            place = self._inside(actor)
-            grid = actor.space.part_of_cell, actor.part
-            tried = places
-            places = self._bodies.timelines.places_aside(
-                actor.row, now.step, now.step + rests, *grid, place, search, reach
-            )
-            if tried is not None and np.array_equal(places, tried):
-                break
-            plan = self._by_places(now, at, places, self._tries_aside, rests, kept)
-            if plan is not None:
-                return plan
-        return None
+        aside = AsideSearch(
+            part_of_cell=actor.space.part_of_cell,
+            part=actor.part,
+            begin=partial(_place_inside, actor),
+            near_cells=int(NEAR_M / cell),
+            far_cells=int(FAR_M / cell),
+            spacing=ASIDE_CELLS,
+            most=ASIDE_TRIES,
+            reach=self._reach[self._number[actor.row]],
+        )
+        body = yielder(actor, self._beat_us)
+        rests = self._free_for
+        continued = self._bodies.timelines.way_aside(
+            body, now.step, at, aside, self._tries_aside, rests, kept, self._far(now)
+        )
+        return None if continued is None else plan_along(now, actor.plan, continued)
 
     def _stop(self, now: Situation, steps: int = 0) -> Plan:
         """Return a plan to stop for a moment, and then to go on."""
@@ -631,7 +642,7 @@ class Yielding(Watcher):
 
     def _far(self, now: Situation) -> int:
         """Return the step up to which a plan has to be free."""
-        return now.step + self._steps(FREE_FOR)
+        return now.step + self._free_for
 
     def _hit_at_rest(self, now: Situation, kept: Distances) -> tuple[int, int] | None:
         """Return the step at which somebody would come too near if it stood still, and who."""
@@ -651,13 +662,13 @@ class Yielding(Watcher):
 
     def _rests(self, row: int, step: int) -> bool:
         """Return whether a body stays where it is for a while, as far as is known."""
-        return self._bodies.timelines.rests(row, step, step + self._steps(FREE_FOR))
+        return self._bodies.timelines.rests(row, step, step + self._free_for)
 
     def _standing(self, now: Situation) -> I64:
         """Return where others stand, or will have stopped; and the distances to keep, (n, 3)."""
         row = now.actor.row
         reach = self._reach[self._number[row]]
-        return self._bodies.timelines.standing(row, now.step, self._steps(FREE_FOR), reach)
+        return self._bodies.timelines.standing(row, now.step, self._free_for, reach)
 
     def _stop_of(self, actor: DecidingActor, step: int) -> LatticePoint | None:
         """Return where a body stops after a step, or is; None if it walks at random."""
@@ -671,13 +682,11 @@ class Yielding(Watcher):
 
     def _is_taken(self, actor: DecidingActor, other: int, step: int, at: int) -> bool:
         """Return whether another body stays where a robot wants to stop next."""
-        if not self._rests(other, step):
-            return False
-        stop = self._stop_of(actor, at)
-        if stop is None:
-            return False
         near = int(self._near[self._number[actor.row], other])
-        return math.dist(stop, self._actors[other].state.position) < near
+        until = step + self._free_for
+        return self._bodies.timelines.takes_stop(
+            actor.row, actor.space.mesh, step, at, other, near, until
+        )
 
     def _queues(self, actor: DecidingActor, other: int, step: int, at: int) -> bool:
         """Return whether another body stays at the charger that a robot wants to get to."""
@@ -687,7 +696,7 @@ class Yielding(Watcher):
 
     def _rest_of(self, row: int, step: int) -> int:
         """Return for how many steps a body surely stays where it is: a power of two of them."""
-        steps = self._steps(FREE_FOR)
+        steps = self._free_for
         rests = self._bodies.timelines.rests
         while steps < self._steps(LONGEST_PAUSE) and rests(row, step, step + 2 * steps):
             steps *= 2
@@ -702,13 +711,6 @@ class Yielding(Watcher):
             return False
         self._swap(row, other, now.step)
         return True
-
-    def _inside(self, actor: DecidingActor) -> LatticePoint:
-        """Return where a robot is, or the nearest place in its space."""
-        x, y = actor.state.position
-        if actor.space.part_of_cell[y // SUB, x // SUB] == actor.part:
-            return x, y
-        return actor.space.nearest(x, y, actor.part) or (x, y)
 
     def _begin_apart(self, actor: DecidingActor) -> None:
         """Move a robot that was drawn into somebody to the nearest free place."""
@@ -733,6 +735,14 @@ class Yielding(Watcher):
 
 def _is_stuck(actor: DecidingActor) -> bool:
     return actor.is_stuck or (actor.charge is not None and actor.charge.is_empty)
+
+
+def _place_inside(actor: DecidingActor) -> LatticePoint:
+    """Return where a robot is, or the nearest place in its space."""
+    x, y = actor.state.position
+    if actor.space.part_of_cell[y // SUB, x // SUB] == actor.part:
+        return x, y
+    return actor.space.nearest(x, y, actor.part) or (x, y)
 
 
 def _charger(actor: DecidingActor) -> LatticePoint | None:

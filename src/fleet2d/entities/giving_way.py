@@ -24,6 +24,7 @@ from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
 from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.kernels import (
+    CELL_CENTRE,
     I32,
     I64,
     SUB,
@@ -284,10 +285,8 @@ class RoutesAround:
         xs, ys = self._body.home.plan.lattice.centre_axes()
         cost = np.zeros(self._body.space.part_of_cell.shape, np.int32)
         for x, y, reach in self.people.tolist():
-            rows, columns = (
-                slice(*np.searchsorted(axis, [middle - reach, middle + reach + 1]).tolist())
-                for axis, middle in ((ys, y), (xs, x))
-            )
+            rows = _cells_between(y - reach, y + reach)
+            columns = _cells_between(x - reach, x + reach)
             away = (xs[columns] - x) ** 2 + (ys[rows, None] - y) ** 2
             cost[rows, columns][away <= reach * reach] = CLOSED
         return cost
@@ -298,6 +297,13 @@ class RoutesAround:
         if space.shortest is not None and strictly_inside(space.mesh, *start):
             return space.shortest.around(*start, *goal, self.people)
         return route_by_cost(space, self.cost, start, goal)
+
+
+def _cells_between(low: int, high: int) -> slice:
+    """Return the rows, or columns, of cells whose centres are at coordinates from low to high."""
+    first = -((CELL_CENTRE - low) // SUB)
+    end = (high - CELL_CENTRE) // SUB + 1
+    return slice(max(first, 0), max(end, 0))
 
 
 def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Note] = ()) -> Plan:
@@ -355,10 +361,10 @@ def _way(
 
 def plan_along(now: Situation, interrupted: Plan, continued: Continued) -> Plan:
     """Return a plan that goes on as the core found: it continues the present one, later."""
-    rows, delays = continued
-    plan = now.plan().take("stand").follow(rows[1:])
-    if isinstance(interrupted.finish(), Track):
-        _take_over(plan, interrupted, [Delay(*delay) for delay in delays])
+    legs, end, delays = continued
+    plan = now.plan().take("stand").go_on_along(legs, end)
+    if not interrupted.is_random_walk:
+        _take_over(plan, interrupted, delays)
     return plan
 
 
@@ -389,7 +395,7 @@ def plan_around(
         The plan; None if there is no way round.
     """
     actor = now.actor
-    if not isinstance(interrupted.finish(), Track):
+    if interrupted.is_random_walk:
         return now.plan().turn_by(0.5)
 
     def free_place(x: int, y: int) -> LatticePoint | None:
@@ -418,7 +424,7 @@ def plan_here(
     Returns:
         The plan; None if that stop is in another room.
     """
-    if not isinstance(interrupted.finish(), Track):
+    if interrupted.is_random_walk:
         return None
     home = now.actor.home.plan
     room = home.room_of_point(*now.actor.state[:2])
@@ -455,11 +461,24 @@ def _continue(
     times = rest[:, 0]
     rest[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
     plan.follow(rest)
-    return _take_over(plan, interrupted, [Delay(begin_us, since_us, later, edge)])
+    return _take_over(plan, interrupted, [(begin_us, since_us, later, edge)])
 
 
-def _take_over(plan: Plan, interrupted: Plan, delays: Sequence[Delay]) -> Plan:
+def _take_over(plan: Plan, interrupted: Plan, delays: Sequence[tuple[int, int, int, int]]) -> Plan:
     """Let a plan have what another one would have done, delayed, and return it."""
+    after_us = delays[0][0]
+    if interrupted.postures or any(note.time_us > after_us for note in interrupted.notes):
+        _repeat_later(plan, interrupted, [Delay(*delay) for delay in delays])
+    if interrupted.postures:
+        plan.posture = interrupted.posture
+    plan.endless = interrupted.endless
+    plan.asks_us = interrupted.asks_us
+    plan.root = interrupted.root
+    return plan
+
+
+def _repeat_later(plan: Plan, interrupted: Plan, delays: Sequence[Delay]) -> None:
+    """Add the notes and the postures of another plan, delayed."""
     for delay, until in zip(delays, [*[d.after_us for d in delays[1:]], math.inf], strict=True):
         plan.notes += [
             Note(delay.of(at), event, detail)
@@ -471,12 +490,6 @@ def _take_over(plan: Plan, interrupted: Plan, delays: Sequence[Delay]) -> Plan:
             for at, code in interrupted.postures
             if delay.after_us < at <= until
         ]
-    if interrupted.postures:
-        plan.posture = interrupted.posture
-    plan.endless = interrupted.endless
-    plan.asks_us = interrupted.asks_us
-    plan.root = interrupted.root
-    return plan
 
 
 def _rows(track: Breakpoints) -> I64:

@@ -280,6 +280,17 @@ class Plan:
             self.time_us, self.x, self.y, self.heading, self.away = breakpoints[-1].tolist()
         return self
 
+    def go_on_along(self, legs: Legs, end: tuple[int, int, int, int, int]) -> Self:
+        """Follow breakpoints of the core instead of all so far: they begin where the plan does.
+
+        Args:
+            legs: The breakpoints.
+            end: Time, x, y, heading and away at the last of them.
+        """
+        self.legs = legs
+        self.time_us, self.x, self.y, self.heading, self.away = end
+        return self
+
     def jump(self, time_us: int, **changes: int) -> Self:
         """Change x, y, heading or away at once, at a moment [us since the start]."""
         pose = {"x": self.x, "y": self.y, "heading": self.heading, "away": self.away}
@@ -438,6 +449,11 @@ class Plan:
         """Return whether it is over at a step."""
         end = self.over_at
         return end is not None and end <= step
+
+    @property
+    def is_random_walk(self) -> bool:
+        """Whether its motion isn't known beforehand."""
+        return isinstance(self._motion, RandomWalk)
 
     def finish(self) -> Motion:
         """Return the motion of the plan, which is complete."""

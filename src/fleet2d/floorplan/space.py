@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -182,6 +182,11 @@ class Space:
         if not strictly_inside(self.mesh, x, y):
             return -1
         return int(self._part_of_triangle[locate(self.mesh, x, y)])
+
+    @property
+    def part_lookup(self) -> I32 | Callable[[int, int], int]:
+        """The parts of the triangles, int32 (triangles,), if they say `part_at`; else `part_at`."""
+        return self._part_of_triangle if type(self).part_at is Space.part_at else self.part_at
 
     def passings(self, start: LatticePoint, goal: LatticePoint) -> Sequence[Any]:
         """Return the portals on the way from one lattice point to another: here none are used."""
