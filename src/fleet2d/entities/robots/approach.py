@@ -14,7 +14,7 @@ from fleet2d.entities.plan import Plan
 from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.plan import Room, cells_of
-from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, Bool, heading_of, points_in_sight
+from fleet2d.kernels import CELL_CENTRE, F64, I64, SUB, Bool, heading_of, pairs_in_sight
 from fleet2d.runtime.determinism import sum_in_order
 
 ANYONE = "anyone"
@@ -57,6 +57,11 @@ class BeliefBehavior(Behavior):
         """Return the algorithm that it reads."""
         return () if self.source is None else (self.source,)
 
+    def output(self, now: Situation) -> Any:
+        """Return the output that it reads, evaluated at the present time; None before the first."""
+        output: Any = now.outputs.get(self.source) if self.source else None
+        return output.at(now.time) if callable(getattr(output, "at", None)) else output
+
     def belief(self, now: Situation, user: str) -> RoomBelief:
         """Return the probabilities of where a user, or ANYONE, is now.
 
@@ -67,12 +72,10 @@ class BeliefBehavior(Behavior):
         Raises:
             ComponentError: The output has no probabilities of rooms.
         """
-        output = now.outputs.get(self.source) if self.source else None
+        output = self.output(now)
         if output is None:
             cells = np.array([room.cells for room in now.home.rooms], np.float64)
             return RoomBelief(cells / cells.sum(), 0.0)
-        if callable(getattr(output, "at", None)):
-            output = output.at(now.time)
         share: Any = getattr(output, "share", None)
         away: Any = getattr(output, "away", 0.0)
         if callable(share):
@@ -135,7 +138,7 @@ def _choose_viewpoints(actor: Actor, room: Room, enough: float, most: int) -> Vi
 def _cover(actor: Actor, room: Room, goals: I64, enough: float, most: int) -> Viewpoints:
     """Choose points in a room, greedily, from which goals (n, 2) are seen, and their share."""
     places = np.concatenate([[actor.middle(room)], stands_in(actor, room)])
-    visible = np.array([visible_from(actor, place, goals) for place in places])
+    visible = visible_from(actor, places, goals)
     points: list[LatticePoint] = []
     unseen = np.ones(len(goals), np.bool_)
     while len(points) < most and unseen.sum() > (1 - enough) * len(goals):
@@ -196,9 +199,8 @@ def unwatched(actor: Actor, stops: Sequence[LatticePoint]) -> list[str]:
     lines = []
     for room in actor.home.rooms:
         names, goals = places_to_see(actor, room)
-        seen = np.zeros(len(goals), np.bool_)
-        for stop in stops:
-            seen |= visible_from(actor, np.array(stop), goals)
+        places = np.array(stops, np.int64).reshape(-1, 2)
+        seen = visible_from(actor, places, goals).any(axis=0)
         if names and not seen.all():
             hidden = list(dict.fromkeys(names[i] for i in np.flatnonzero(~seen)))
             lines.append(f"{room.name} ({np.mean(~seen):.0%} of its places: {', '.join(hidden)})")
@@ -207,12 +209,21 @@ def unwatched(actor: Actor, stops: Sequence[LatticePoint]) -> list[str]:
     return lines
 
 
-def visible_from(actor: Actor, place: I64, goals: I64) -> Bool:
-    """Return which goals (n, 2) are in range and in sight of a place, at any heading, bool (n,)."""
-    x, y = int(place[0]), int(place[1])
-    near = (goals[:, 0] - x) ** 2 + (goals[:, 1] - y) ** 2 <= sight_range(actor) ** 2
-    visible = np.zeros(len(goals), np.bool_)
-    visible[near] = points_in_sight(actor.home.walls, x, y, goals[near])
+def visible_from(actor: Actor, places: I64, goals: I64) -> Bool:
+    """Return which goals are in range and in sight of places, at any heading.
+
+    Args:
+        actor: The body with the cameras.
+        places: Lattice points (n, 2).
+        goals: Lattice points (m, 2).
+
+    Returns:
+        bool (n, m).
+    """
+    dx, dy = places.T[:, :, np.newaxis] - goals.T[:, np.newaxis]
+    visible = dx * dx + dy * dy <= sight_range(actor) ** 2
+    place, goal = cells_of(visible).T
+    visible[visible] = pairs_in_sight(actor.home.walls, places[place], goals[goal])
     return visible
 
 

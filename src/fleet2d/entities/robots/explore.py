@@ -136,6 +136,6 @@ class Explore(Behavior):
         if self.visible[0] != actor.home.version:
             self.visible = actor.home.version, {}
         if stand not in self.visible[1]:
-            place = centres(self.stands[stand : stand + 1])[0]
-            self.visible[1][stand] = visible_from(actor, place, centres(self.targets))
+            place = centres(self.stands[stand : stand + 1])
+            self.visible[1][stand] = visible_from(actor, place, centres(self.targets))[0]
         return self.visible[1][stand]

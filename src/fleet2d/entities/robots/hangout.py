@@ -265,7 +265,8 @@ class Hangout(BeliefBehavior):
         self.penalty = self.places.block + SEAT_WEIGHT * self.places.prox
         self.ways: tuple[Space, dict[LatticePoint, F64]] = actor.space, {}
         self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
-        self.rated_by = b""  # the probabilities behind `worth`
+        self.rated_output: object = None  # the output behind `worth`; None before the first
+        self.rated_by = b""  # the probabilities behind it
         self.worth = -self.penalty
         self.best = -np.inf  # the largest of `worth`
         self.place: int | None = None
@@ -307,8 +308,11 @@ class Hangout(BeliefBehavior):
 
     def _choose(self, now: Situation, plan: Plan) -> None:
         """Choose the place to stand at until the next period."""
-        belief = self.belief(now, self.user)
-        worth = self._worth(belief.joint)
+        output = self.output(now)
+        if output is None or output is not self.rated_output:  # an output never changes
+            self._rate(self.belief(now, self.user).joint)
+            self.rated_output = output
+        worth = self.worth
         if self._stays(plan, worth):
             return
         scores = worth - self._ways(now.actor)
@@ -337,8 +341,8 @@ class Hangout(BeliefBehavior):
             if plan.reaches(*point):
                 plan.go_to_point(*point).turn_by(1.0)
 
-    def _worth(self, joint: F64) -> F64:
-        """Return the rating of each place but for its way, float64 (n,), by chances of rooms."""
+    def _rate(self, joint: F64) -> None:
+        """Rate each place but for its way, by chances of rooms, float64 (rooms,)."""
         probabilities = joint.tobytes()
         if probabilities != self.rated_by:
             gain = np.zeros(len(self.places.points))
@@ -348,7 +352,6 @@ class Hangout(BeliefBehavior):
             self.rated_by = probabilities
             self.worth = gain - self.penalty
             self.best = self.worth.max()
-        return self.worth
 
     def _ways(self, actor: Actor) -> F64:
         """Return the cost of the way to each place, float64 (n,), infinite without a way.
