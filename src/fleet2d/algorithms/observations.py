@@ -87,9 +87,10 @@ class SightingTable:
         index = self.index[part]
         distinct = self.distinct
         if len(index) < len(distinct):
-            used, of_used = np.unique(index, return_inverse=True)
-            index = of_used.astype(np.int32)
-            distinct = distinct[used]
+            is_used = np.zeros(len(distinct), np.bool_)
+            is_used[index] = True
+            index = (np.cumsum(is_used, dtype=np.int32) - 1)[index]
+            distinct = distinct[is_used]
         return SightingTable(self.step[part], index, distinct)
 
     def rows(self) -> I64:

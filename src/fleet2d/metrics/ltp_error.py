@@ -64,8 +64,7 @@ def jensen_shannon(truth: F64, estimate: F64) -> F64:
         >>> float(jensen_shannon(np.array([1.0, 0.0]), np.array([0.0, 1.0])))
         1.0
     """
-    middle = (truth + estimate) / 2
-    both = _relative_entropy(truth, middle) + _relative_entropy(estimate, middle)
+    both = _relative_entropy(np.stack([truth, estimate]), (truth + estimate) / 2).sum(axis=0)
     return np.clip(both / (2 * LN_2), 0.0, 1.0)
 
 

@@ -105,7 +105,7 @@ class Likelihood(Estimator):
         rooms = (sums.shape[-1] - 3) // 2
         bins = sums[..., -1]
         away = np.where(bins > 0, sums[..., rooms] / np.where(bins > 0, bins, 1), 0.0)
-        return normalized(np.maximum(sums[..., :rooms], 0)), np.clip(away, 0, 1)
+        return normalized(np.maximum(sums[..., :rooms], 0)), np.minimum(np.maximum(away, 0), 1)
 
     def interval(self, key: np.uint64, level: float) -> tuple[F64, F64]:
         """Return intervals for the shares of time in each room, over the time so far.
