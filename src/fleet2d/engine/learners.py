@@ -116,14 +116,19 @@ class Learners:
 
     def results_at(self, step: int) -> dict[str, Callable[[], Any]]:
         """Return how to read the results of the metrics that were updated at a step, by name."""
-        updated = [(each.name, each.component) for each in self.all if each.since == step]
-        return {name: part.result for name, part in updated if isinstance(part, Metric)}
+        return {
+            each.name: each.component.result
+            for each in self.all
+            if each.since == step and isinstance(each.component, Metric)
+        }
 
     def results(self) -> dict[str, Any]:
         """Return the results of all metrics up to the end of their last period, by name."""
-        parts = [(each.name, each.component) for each in self.all]
-        metrics = {name: part for name, part in parts if isinstance(part, Metric)}
-        return {name: check_result(metric.result()) for name, metric in metrics.items()}
+        return {
+            each.name: check_result(each.component.result())
+            for each in self.all
+            if isinstance(each.component, Metric)
+        }
 
     def _show_outputs(self) -> None:
         """Set the outputs that behaviors read, after some have changed."""

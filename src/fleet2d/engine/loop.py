@@ -97,7 +97,7 @@ def decide(state: State, span: Span) -> None:
     step = span.first
     yielding = state.yielding
     rows = () if yielding is None else yielding.rows
-    begun = set[int]()  # robots whose plans may still be replaced, as others are in their way
+    begun: set[int] = set()  # robots whose plans may still be replaced, as others are in their way
     for row in _asked(state, step):
         begins = _decide(state, row, step)
         if begins and row in rows:

@@ -156,6 +156,8 @@ class Sensors(Watcher):
 
     def take_events(self, events: Sequence[Event]) -> None:
         """Record the activities of users, for the readings."""
+        if not self.sensors:
+            return
         for event in events:
             if event.event == EventKind.ACTIVITY and event.entity in self._activities:
                 self._activities[event.entity].append((event.step, event.detail))

@@ -125,7 +125,7 @@ class Arbiter:
         """
         if fresh:
             self.own = plan.interrupts
-        times = list[datetime | None]()
+        times: list[datetime | None] = []
         events = self.own
         active = None if self.active is None else self.behaviors[self.active]
         if self.active is not None and active is not None and active.when and not active.busy():
