@@ -8,7 +8,7 @@ from tests.meshed_homes import plan_files
 from typer.testing import CliRunner
 
 from fleet2d.cli.__main__ import app
-from fleet2d.floorplan.checkup import Finding, checkup
+from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.native import native_document
@@ -25,18 +25,93 @@ REGIONS = (
 )
 
 
-def home(free: shapely.Geometry = FREE, regions=REGIONS, **parts) -> FloorPlan:  # type: ignore[no-untyped-def]
+def home(free=FREE, regions=REGIONS, **parts):  # type: ignore[no-untyped-def]
     return FloorPlan.build("home", free, regions, **parts)
 
 
-def only(findings: list[Finding]) -> Finding:
+def only(findings):
     assert 1 == len(findings), [finding.text for finding in findings]
     return findings[0]
 
 
-def test_sound_home_has_no_findings():
-    assert [] == checkup(home(doorways=[DoorLine((5.1, 1.5), (5.1, 2.4))], entrance=(1, 1)))
-    assert [] == checkup(load_floorplan())
+NARROW = shapely.union_all([LEFT, RIGHT, shapely.box(5, 1.5, 5.2, 1.9)])
+BED = stand_furniture("single_bed", (9.5, 3.0), 1024, (0.9, 2.0), name="cot")
+FENCES = [
+    PlacedObject("", "fence", shapely.box(8.6, 1.7, 10, 1.8)),
+    PlacedObject("", "fence", shapely.box(8.6, 1.8, 8.8, 4)),
+]
+WHOLE_DOOR = DoorLine((2, 0), (2, 4))
+
+
+def labelled(label, *box):
+    return LabelledRegion((label,), shapely.box(*box))
+
+
+@pytest.mark.parametrize(
+    ("parts", "radius"),
+    [
+        ({"doorways": [DoorLine((5.1, 1.5), (5.1, 2.4))], "entrance": (1, 1)}, 0.15),
+        ({"free": NARROW}, 0.15),
+        ({"no_go": [shapely.box(0, 0, 4, 4)]}, 0.15),
+        (
+            {"objects": [PlacedObject("dock", "charger", shapely.box(-0.2, 1, 0, 1.3), "nothing")]},
+            0.15,
+        ),
+        ({"doorways": [DoorLine((2, 0), (2, 4), leaf=False)]}, 0.15),
+        ({"regions": [*REGIONS, LabelledRegion(("Office",), REGIONS[1].shape)]}, 0.15),
+    ],
+    ids=[
+        "sound",
+        "narrow",
+        "small no-go area",
+        "charger in a niche",
+        "opening",
+        "two labels of a box",
+    ],
+)
+def test_home_without_faults_has_no_findings(parts, radius):
+    assert [] == checkup(home(**parts), radius=radius)
+
+
+@pytest.mark.parametrize(
+    ("parts", "radius", "kind", "severity", "text"),
+    [
+        ({"no_go": [shapely.box(0, 0, 10, 3)]}, 0.15, "no_go", "wrong",
+         "robots keep out of 75 % of the floor"),
+        ({"regions": [labelled("Kichen", 0, 0, 5.1, 4), labelled("Yoga studio", 5.1, 0, 10, 4)]},
+         0.15, "labels", "odd", "kichen_1 has the unusual type 'kichen': did you mean 'kitchen'?"),
+        ({"free": NARROW}, 0.22, "room", "wrong",
+         "a body of radius 0.22 m can't get to bedroom_1 (19.2 m2)"),
+        ({"free": NARROW, "entrance": (7, 2)}, 0.22, "room", "wrong", "can't get to living_room_1"),
+        ({"entrance": (0.05, 0.05)}, 0.15, "entrance", "wrong", ""),
+        ({"objects": [stand_furniture("shelf", (5.5, 2.0), 0, (1.6, 0.4))]}, 0.15, "room", "wrong",
+         "furniture keeps a body of radius 0.15 m out of 15.7 m2 of bedroom_1"),
+        ({"objects": [BED, *FENCES]}, 0.15, "object", "wrong", "nobody can get to cot"),
+        ({"doorways": [DoorLine((2.0, 20.0), (3.0, 20.0), "trapdoor")]}, 0.15, "door", "wrong",
+         "trapdoor"),
+        ({"doorways": [WHOLE_DOOR]}, 0.15, "door", "odd", "4.00 m wide"),
+        ({"regions": [*REGIONS, labelled("Garage", 4, -10, 6, -6)]}, 0.15, "outside", "odd",
+         "100 % of what is labelled garage lies outside the home"),
+        ({"regions": [*REGIONS, labelled("Office", 6, 0, 10, 4)]}, 0.15, "overlap", "odd",
+         "the labels bedroom and office overlap by 16.0 m2"),
+        ({}, 3.0, "space", "unlivable", ""),
+    ],
+)  # fmt: skip
+def test_fault_is_found(parts, radius, kind, severity, text):
+    finding = checkup(home(**parts), radius=radius)[0]
+
+    assert (kind, severity) == (finding.kind, finding.severity)
+    assert text in finding.text
+
+
+def test_findings_are_marked_at_their_place():
+    lost = DoorLine((2.0, 20.0), (3.0, 20.0), "trapdoor")
+    regions = [*REGIONS, labelled("Office", 6, 0, 10, 4)]
+
+    assert (0.05, 0.05) == only(checkup(home(entrance=(0.05, 0.05)))).at
+    assert (2.5, 20.0) == only(checkup(home(doorways=[lost]))).at
+    assert BED.footprint == only(checkup(home(objects=[BED, *FENCES]))).shape
+    assert (6, 0, 10, 4) == only(checkup(home(regions=regions))).shape.bounds
 
 
 def test_part_that_nothing_joins_is_found():
@@ -54,12 +129,24 @@ def test_part_that_nothing_joins_is_found():
     )
 
 
-def test_doorway_that_ends_before_the_wall_does_is_told_with_the_gap():
-    short = shapely.box(5, 1.5, 5.19, 2.4)
+@pytest.mark.parametrize(
+    ("bits", "severity", "text"),
+    [
+        # 0.01 m on the lattice
+        ([shapely.box(5, 1.5, 5.19, 2.4)], "wrong", "though they are only 0.009 m apart at (5.20, "),
+        (
+            [DOOR, *(shapely.box(11 + i, 0, 11.3 + i, 0.5) for i in range(3))],
+            "odd", "joins 3 parts smaller than 0.5 m2",
+        ),
+    ],
+    ids=["a doorway ends before the wall does", "small parts are one finding"],
+)  # fmt: skip
+def test_parts_are_told_with_what_may_be_wrong(bits, severity, text):
+    findings = checkup(home(shapely.union_all([LEFT, RIGHT, *bits])))
+    part = only([finding for finding in findings if finding.kind == "parts"])
 
-    part = checkup(home(shapely.union_all([LEFT, RIGHT, short])))[0]
-
-    assert "though they are only 0.009 m apart at (5.20, " in part.text  # 0.01 m on the lattice
+    assert severity == part.severity
+    assert text in part.text
 
 
 def test_a_no_go_area_without_floor_is_noted():
@@ -71,61 +158,6 @@ def test_a_no_go_area_without_floor_is_noted():
     )
 
 
-def test_no_go_areas_over_most_of_the_floor_are_found():
-    finding = only(checkup(home(no_go=[shapely.box(0, 0, 10, 3)])))
-
-    assert ("no_go", "wrong") == (finding.kind, finding.severity)
-    assert "robots keep out of 75 % of the floor" in finding.text
-    assert [] == checkup(home(no_go=[shapely.box(0, 0, 4, 4)]))
-
-
-def test_misspelled_type_of_a_room_is_found_with_the_nearest_one():
-    kichen = LabelledRegion(("Kichen",), shapely.box(0, 0, 5.1, 4))
-    studio = LabelledRegion(("Yoga studio",), shapely.box(5.1, 0, 10, 4))
-
-    finding = only(checkup(home(regions=[kichen, studio])))
-
-    assert "kichen_1 has the unusual type 'kichen': did you mean 'kitchen'?" == finding.text
-
-
-def test_small_parts_are_one_odd_finding():
-    bits = [shapely.box(11 + i, 0, 11.3 + i, 0.5) for i in range(3)]
-    findings = checkup(home(shapely.union_all([FREE, *bits])))
-    parts = only([finding for finding in findings if finding.kind == "parts"])
-
-    assert "odd" == parts.severity
-    assert "joins 3 parts smaller than 0.5 m2" in parts.text
-
-
-def test_room_with_too_narrow_a_door_is_found():
-    narrow = shapely.union_all([LEFT, RIGHT, shapely.box(5, 1.5, 5.2, 1.9)])
-
-    assert [] == checkup(home(narrow), radius=0.15)
-    room = only(checkup(home(narrow), radius=0.22))
-    assert ("room", "wrong") == (room.kind, room.severity)
-    assert "a body of radius 0.22 m can't get to bedroom_1 (19.2 m2)" == room.text
-
-
-def test_rooms_are_counted_from_the_entrance():
-    narrow = shapely.union_all([LEFT, RIGHT, shapely.box(5, 1.5, 5.2, 1.9)])
-    room = only(checkup(home(narrow, entrance=(7, 2)), radius=0.22))
-
-    assert "can't get to living_room_1" in room.text
-
-
-def test_entrance_where_nobody_can_stand_is_found():
-    entrance = only(checkup(home(entrance=(0.05, 0.05))))
-
-    assert ("entrance", (0.05, 0.05)) == (entrance.kind, entrance.at)
-
-
-def test_furniture_that_shuts_a_room_is_named_as_the_cause():
-    shelf = stand_furniture("shelf", (5.5, 2.0), 0, (1.6, 0.4))
-    findings = checkup(home(objects=[shelf]))
-
-    assert "furniture keeps a body of radius 0.15 m out of 15.7 m2 of bedroom_1" in findings[0].text
-
-
 def test_furniture_in_the_doorway_is_named_as_the_cause():
     table = stand_furniture("table", (5.3, 1.95), 0, (0.85, 0.5))
     closet = shapely.box(5, 1.5, 5.7, 2.4)
@@ -134,19 +166,6 @@ def test_furniture_in_the_doorway_is_named_as_the_cause():
     plan = home(LEFT.union(closet), plan.regions, objects=[table])
 
     assert "furniture keeps a body of radius 0.15 m out of storage_1" in checkup(plan)[0].text
-
-
-def test_bed_that_nobody_can_get_to_is_found():
-    bed = stand_furniture("single_bed", (9.5, 3.0), 1024, (0.9, 2.0), name="cot")
-    fence = [
-        PlacedObject("", "fence", shapely.box(8.6, 1.7, 10, 1.8)),
-        PlacedObject("", "fence", shapely.box(8.6, 1.8, 8.8, 4)),
-    ]
-    finding = only(checkup(home(objects=[bed, *fence])))
-
-    assert ("object", "wrong") == (finding.kind, finding.severity)
-    assert "nobody can get to cot" in finding.text
-    assert bed.footprint == finding.shape
 
 
 def test_object_in_a_wall_and_objects_in_each_other_are_found():
@@ -161,52 +180,11 @@ def test_object_in_a_wall_and_objects_in_each_other_are_found():
     assert any("two and one stand in each other" in text for text in texts)
 
 
-def test_charger_in_its_niche_is_no_fault():
-    niche = PlacedObject("dock", "charger", shapely.box(-0.2, 1, 0, 1.3), "nothing")
-
-    assert [] == checkup(home(objects=[niche]))
-
-
-def test_door_in_no_wall_is_found():
-    lost = DoorLine((2.0, 20.0), (3.0, 20.0), "trapdoor")
-    finding = only(checkup(home(doorways=[lost])))
-
-    assert ("door", "wrong", (2.5, 20.0)) == (finding.kind, finding.severity, finding.at)
-    assert "trapdoor" in finding.text
-
-
-def test_door_as_wide_as_a_room_is_found():
-    assert "4.00 m wide" in only(checkup(home(doorways=[DoorLine((2, 0), (2, 4))]))).text
-    assert [] == checkup(home(doorways=[DoorLine((2, 0), (2, 4), leaf=False)]))
-
-
-def test_label_outside_the_home_is_found():
-    far = LabelledRegion(("Garage",), shapely.box(4, -10, 6, -6))
-    finding = only(checkup(home(regions=[*REGIONS, far])))
-
-    assert ("outside", "odd") == (finding.kind, finding.severity)
-    assert "100 % of what is labelled garage lies outside the home" in finding.text
-
-
-def test_labels_that_overlap_are_found_once():
-    office = LabelledRegion(("Office",), shapely.box(6, 0, 10, 4))
-    finding = only(checkup(home(regions=[*REGIONS, office])))
-
-    assert "the labels bedroom and office overlap by 16.0 m2" in finding.text
-    assert (6, 0, 10, 4) == finding.shape.bounds
-
-
-def test_two_labels_of_one_box_do_not_overlap():
-    both = LabelledRegion(("Office",), REGIONS[1].shape)
-
-    assert [] == checkup(home(regions=[*REGIONS, both]))
-
-
 @pytest.mark.parametrize(
     ("factor", "unit"), [(100, "centimetres"), (20, "pixels of 5 cm"), (0.1, "very small")]
 )
 def test_wrong_scale_is_found_with_a_guess(factor, unit):
-    def scale_shape(shape: shapely.Geometry) -> shapely.Geometry:
+    def scale_shape(shape):
         return shapely.transform(shape, lambda xy: xy * factor)
 
     regions = [LabelledRegion(region.labels, scale_shape(region.shape)) for region in REGIONS]
@@ -220,8 +198,9 @@ def test_wrong_scale_is_found_with_a_guess(factor, unit):
 def test_doors_of_a_dolls_house_are_found():
     walls = [shapely.box(x, 0, x + 0.1, 5) for x in (2, 4, 6)]
     gaps = [shapely.box(x, 2, x + 0.1, 2.35) for x in (2, 4, 6)]
-    free = shapely.box(0, 0, 8, 5).difference(shapely.union_all(walls))
-    free = free.union(shapely.union_all(gaps))
+    free = (
+        shapely.box(0, 0, 8, 5).difference(shapely.union_all(walls)).union(shapely.union_all(gaps))
+    )
     lines = [DoorLine((x + 0.05, 2), (x + 0.05, 2.35)) for x in (2, 4, 6)]
     plan = home(free, [LabelledRegion(("Office",), free.envelope)], doorways=lines)
 
@@ -237,12 +216,6 @@ def test_specks_tiny_rooms_and_missing_labels_are_found():
     assert "1 piece of wall smaller than 0.02 m2" in kinds["specks"].text
     assert "storage_1 has only 0.25 m2" == kinds["room"].text
     assert "99 % of the floor belongs to no room" in kinds["labels"].text
-
-
-def test_home_that_no_body_fits_into_is_unlivable():
-    findings = checkup(home(), radius=3.0)
-
-    assert ("unlivable", "space") == (findings[0].severity, findings[0].kind)
 
 
 @pytest.mark.slow

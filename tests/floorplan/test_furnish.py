@@ -1,15 +1,12 @@
 """Furniture by rule: in free space, apart, off the doorways, and all rooms stay reachable."""
 
 from collections import Counter
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from shapely import Polygon
 from tests.meshed_homes import plan_files
 from tests.strategies import homes, quick
 from tests.thorough import some
@@ -26,9 +23,7 @@ from fleet2d.floorplan.furniture_places import (
 )
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.rooms.room import PRIORITY
 from fleet2d.floorplan.space import BODY_RADIUS, Space
 from fleet2d.runtime.determinism import Draws, stream_key
 
@@ -36,16 +31,12 @@ from fleet2d.runtime.determinism import Draws, stream_key
 POCKET_M2 = 0.1
 
 
-def of_type(plan: FloorPlan, kind: str) -> list[PlacedObject]:
+def of_type(plan, kind):
     """Return the objects of a type."""
     return [thing for thing in plan.objects if thing.type == kind]
 
 
-def footprints(plan: FloorPlan) -> list[Polygon]:
-    return [thing.footprint for thing in plan.objects]
-
-
-def check_stands_free(empty: FloorPlan, plan: FloorPlan) -> None:
+def check_stands_free(empty, plan):
     free = plan.free_space.buffer(1e-6)
     added = plan.objects[len(empty.objects) :]
     assert all(shapely.covers(free, thing.footprint) for thing in added)
@@ -58,7 +49,7 @@ def check_stands_free(empty: FloorPlan, plan: FloorPlan) -> None:
     assert [] == overlaps
 
 
-def check_ways(empty: FloorPlan, plan: FloorPlan) -> None:
+def check_ways(empty, plan):
     """Free places that were connected in the empty home still are."""
     before, after = Space(empty, BODY_RADIUS), Home(plan).space(BODY_RADIUS)
     cell = plan.lattice.cell
@@ -73,7 +64,7 @@ def check_ways(empty: FloorPlan, plan: FloorPlan) -> None:
             assert (in_room & (after.part_of_cell >= 0)).any()
 
 
-def check_uses(plan: FloorPlan) -> None:
+def check_uses(plan):
     space = Home(plan).space(BODY_RADIUS)
     for thing in plan.objects:
         if thing.type in FURNITURE and FURNITURE[thing.type].uses:
@@ -86,34 +77,25 @@ def check_uses(plan: FloorPlan) -> None:
                     assert (use.x, use.y) == use.approach
 
 
-def check_all(empty: FloorPlan, plan: FloorPlan) -> None:
+def check_all(empty, plan):
     check_stands_free(empty, plan)
     check_ways(empty, plan)
     check_uses(plan)
 
 
-@cache
-def plan_of(path: Path) -> FloorPlan:
-    return load_floorplan(path)
-
-
 @pytest.mark.slow
-def test_every_plan_of_houseexpo_is_furnished_without_harm(shared_data):
+def test_real_homes_and_maps_of_robots_are_furnished_without_harm(shared_data):
     paths = plan_files(shared_data)
+    paths += some(
+        [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")], 3
+    )
     pieces = 0
     for path in paths:
-        plan = furnish(plan_of(path))
-        check_all(plan_of(path), plan)
+        empty = load_floorplan(path)
+        plan = furnish(empty)
+        check_all(empty, plan)
         pieces += len(plan.objects)
-    assert pieces > 14 * len(paths)
-
-
-@pytest.mark.slow
-def test_maps_of_robots_are_furnished_without_harm(shared_data):
-    paths = [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")]
-    assert 6 == len(paths)
-    for path in some(paths, 3):
-        check_all(plan_of(path), furnish(plan_of(path)))
+    assert pieces > 12 * len(paths)
 
 
 @pytest.mark.slow
@@ -133,21 +115,12 @@ def test_furniture_never_disconnects_a_home(polygons, kind, seed):
     check_all(plan, furnished)
 
 
-@pytest.mark.slow
-def test_same_seed_gives_the_same_furniture_and_another_one_other():
-    plan = load_floorplan()
-    bare = FloorPlan.build("bare", plan.free_space, plan.regions)
-
-    assert furnish(bare, 3) == furnish(bare, 3)
-    assert furnish(bare, 3).digest != furnish(bare, 4).digest
-
-
-def one_room(kind: str, width: float = 5.0, depth: float = 4.0) -> FloorPlan:
+def one_room(kind, width=5.0, depth=4.0):
     box = shapely.box(0, 0, width, depth)
     return FloorPlan.build("room", box, [LabelledRegion((kind,), box)])
 
 
-def types(plan: FloorPlan) -> Counter[str]:
+def types(plan):
     return Counter(thing.type for thing in plan.objects)
 
 
@@ -166,14 +139,10 @@ def types(plan: FloorPlan) -> Counter[str]:
     ],
 )
 def test_room_gets_what_its_type_needs(kind, expected):
-    assert expected <= set(types(furnish(one_room(kind))))
+    plan = one_room(kind)
 
-
-def test_kitchen_stands_along_one_wall():
-    plan = furnish(one_room("kitchen"))
-    line = [of_type(plan, kind)[0] for kind in ("stove", "sink", "fridge")]
-
-    assert 1 == len({thing.heading for thing in line})
+    assert expected <= set(types(furnish(plan)))
+    assert furnish(plan, 3) == furnish(plan, 3)
 
 
 def test_bed_has_its_head_at_a_wall_and_the_tv_faces_the_sofa():
@@ -231,10 +200,6 @@ def test_rooms_of_no_known_type_get_nothing():
     assert () == furnish(one_room("yoga_studio")).objects
 
 
-def test_every_rule_is_for_a_type_of_the_vocabulary():
-    assert set(RULES) <= set(PRIORITY)
-
-
 def test_density_zero_leaves_only_essential_furniture():
     plan = one_room("bedroom")
 
@@ -270,19 +235,8 @@ def test_nothing_stands_before_a_doorway():
     for seed in range(10):
         furnished = furnish(plan, seed)
         assert len(furnished.objects) >= 5
-        covered = shapely.union_all(footprints(furnished))
+        covered = shapely.union_all([thing.footprint for thing in furnished.objects])
         assert shapely.intersection(before, covered).area < 1e-9
-
-
-def test_charger_stands_once_in_the_hallway():
-    plan = furnish(load_floorplan())
-    chargers = of_type(plan, "charger")
-
-    assert 1 == len(chargers)
-    at = chargers[0].footprint.centroid
-    room = plan.room_at(at.x, at.y)
-    assert room is not None
-    assert "hallway" == room.type
 
 
 def test_home_that_nobody_fits_into_is_refused():

@@ -8,19 +8,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furniture import FURNITURE, furniture_type, stand_furniture
 from fleet2d.kernels import QUARTER, TURN
 
-TALL = {"wardrobe", "fridge", "bookshelf", "shelf"}
 ALL = [pytest.param(furniture, id=furniture.type) for furniture in FURNITURE.values()]
-
-
-@pytest.mark.parametrize("furniture", ALL)
-def test_sizes_of_a_type_are_a_range_of_a_home(furniture):
-    for low, high in (furniture.width, furniture.depth):
-        assert 0.2 <= low <= high <= 2.5
-
-
-@pytest.mark.parametrize("furniture", ALL)
-def test_only_what_is_tall_blocks_sight(furniture):
-    assert (furniture.type in TALL) == (furniture.blocks == "sight")
 
 
 @pytest.mark.parametrize("furniture", ALL)

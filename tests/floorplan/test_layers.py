@@ -1,7 +1,6 @@
 """Layers: their cells, their names, and what is refused."""
 
 import copy
-from datetime import timedelta
 
 import numpy as np
 import pytest
@@ -30,14 +29,6 @@ def test_layer_holds_its_fill_and_written_values(home):
     assert np.asarray(layer).max() == 7
     layer.values = np.zeros(layer.values.shape)
     assert not layer.values.any()
-
-
-@pytest.mark.parametrize(
-    ("dtype", "expected"),
-    [("bool", "bool"), ("int", "int64"), ("float", "float64"), ("uint8", "uint8")],
-)
-def test_dtypes_are_those_of_numpy(home, dtype, expected):
-    assert expected == str(home.layers.add("a", dtype, fill=1).values.dtype)
 
 
 def test_same_layer_may_be_added_twice_and_another_of_its_name_not(home):
@@ -131,13 +122,3 @@ def test_wrong_layer_of_a_scenario_is_an_error_that_says_where(layers, why):
     with pytest.raises(InputError, match=why) as caught:
         fleet2d.load_scenario(content)
     assert "floorplan.layers" in str(caught.value)
-
-
-def test_scenario_with_layers_comes_back_from_what_is_stored():
-    content = scenario()
-    content["floorplan"] |= {"layers": {"dust": {"every": "1 h"}}, "costmap": {"clearance": 0.3}}
-    loaded = fleet2d.load_scenario(content)
-
-    again = fleet2d.load_scenario(loaded.resolved())
-    assert loaded == again
-    assert again.floorplan.layers["dust"].every == timedelta(hours=1)

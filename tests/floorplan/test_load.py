@@ -1,9 +1,7 @@
 """All real maps against the numbers of their own files."""
 
-import json
 import re
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -12,9 +10,7 @@ from fleet2d.configuration.built_in import COMPONENTS
 from fleet2d.configuration.units import Text
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import advise_type, format_of_file, is_floorplan, load_floorplan
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.homes.formats.valetudo import Valetudo
 from fleet2d.homes.synthetic.source import Synthetic
 
 # How many rooms the file has (None: it names none), and its free space without specks and scraps [m2].
@@ -28,12 +24,6 @@ MAPS = {
 }
 
 
-def test_table_has_every_map(shared_data):
-    maps = {*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")}
-
-    assert {str(path.relative_to(shared_data)) for path in maps} == set(MAPS)
-
-
 @pytest.mark.parametrize("file", MAPS)
 def test_map_has_the_rooms_and_the_area_of_its_file(shared_data, file):
     rooms, area = MAPS[file]
@@ -44,22 +34,6 @@ def test_map_has_the_rooms_and_the_area_of_its_file(shared_data, file):
     assert rooms in (None, len(plan.rooms))
     assert np.array_equal(plan.free, plan.room_of_cell >= 0)
     assert plan.area_m2 == pytest.approx(sum(room.area_m2 for room in plan.rooms))
-
-
-@pytest.mark.parametrize("file", [file for file, (rooms, _) in MAPS.items() if rooms])
-def test_named_rooms_have_the_areas_that_the_file_states(shared_data, file):
-    """But for the few pixels that are wall, too."""
-    content = json.loads((shared_data / file).read_text())
-    segments = [layer for layer in content["layers"] if layer["type"] == "segment"]
-    stated = {
-        s["metaData"].get("name") or f"segment_{s['metaData']['segmentId']}": s["metaData"]["area"]
-        for s in segments
-    }
-
-    plan = Valetudo(path=shared_data / file, bridge_pixels=0, scrap_area_m2=0).load()
-
-    areas = {room.name: room.area_m2 for room in plan.rooms if room.name != "unknown_1"}
-    assert {name: pytest.approx(area / 100**2, abs=0.011) for name, area in stated.items()} == areas
 
 
 def test_synthetic_home_is_named_by_its_seed():
@@ -88,19 +62,14 @@ def test_advice_about_a_file_named_as_a_type_follows_its_content(name, content, 
     assert re.search(advice, advise_type(Text(name, tmp_path)))
 
 
-@pytest.mark.parametrize("name", ["synthetic", "acme.home", "mine.json:Home"])
-def test_no_advice_about_what_names_no_file(name):
-    assert advise_type(name) == ""
-
-
 def test_format_is_recognized_by_the_ending_that_it_declares(tmp_path, monkeypatch):
     class Drawn(FloorPlanSource):
         """A home, named in a file that is neither JSON nor YAML."""
 
-        suffixes: ClassVar = (".home",)
+        suffixes = (".home",)
         path: Path
 
-        def load(self) -> FloorPlan:
+        def load(self):
             return load_floorplan(self.path.read_text(), self.cell)
 
     monkeypatch.setitem(COMPONENTS["floorplan"], "drawn", "tests.homes:Drawn")

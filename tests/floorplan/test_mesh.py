@@ -11,12 +11,11 @@ from tests.strategies import homes, quick
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
 from fleet2d.homes.formats.occupancy import outline
-from fleet2d.kernels import Mesh
 
 SQUARE = [(0, 0), (640, 0), (640, 640), (0, 640)]
 
 
-def doubled_area(mesh: Mesh) -> int:
+def doubled_area(mesh):
     """Return twice the area of all triangles, each of which must count positively."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T
@@ -25,7 +24,7 @@ def doubled_area(mesh: Mesh) -> int:
     return int(areas.sum())
 
 
-def check_mesh(mesh: Mesh, polygons: list[Polygon]) -> None:
+def check_mesh(mesh, polygons):
     """Check everything that the kernels rely on."""
     keys = [tuple(vertex) for vertex in mesh.vertices.tolist()]
     assert keys == sorted(set(keys))
@@ -122,7 +121,6 @@ def test_corners_in_the_middle_of_a_straight_wall_are_dropped():
     ("polygons", "message"),
     [
         ([], "no free space"),
-        ([Polygon()], "no free space"),
         ([shapely.box(0, 0, 63, 64)], "even lattice units"),
         ([shapely.box(0, 0, 64.5, 64)], "even lattice units"),
         ([shapely.box(-2, 0, 64, 64)], "the plan covers"),
@@ -130,7 +128,6 @@ def test_corners_in_the_middle_of_a_straight_wall_are_dropped():
         ([shapely.box(0, 0, 200, 200), shapely.box(100, 100, 300, 300)], "overlap"),
         ([Polygon([(0, 0), (200, 200), (200, 0), (0, 300)])], "outlines cross"),
         ([shapely.box(0, 0, 200, 200), shapely.box(200, 0, 300, 200)], "share a piece of wall"),
-        ([shapely.box(0, 0, 200, 200), shapely.box(0, 0, 200, 200)], "overlap"),
         ([shapely.box(0, 0, 200, 200), shapely.box(50, 50, 100, 100)], "overlap"),
     ],
 )
@@ -153,13 +150,8 @@ def test_snapping_moves_walls_to_even_units_within_the_tolerance(shared_data):
 
 
 def test_snapping_drops_what_is_thinner_than_the_lattice():
-    rooms = shapely.union_all(
-        [
-            shapely.box(0, 0, 100, 100),
-            shapely.box(100, 50, 200, 50.5),
-            shapely.box(200, 0, 300, 100),
-        ]
-    )
+    boxes = [(0, 0, 100, 100), (100, 50, 200, 50.5), (200, 0, 300, 100)]
+    rooms = shapely.union_all([shapely.box(*box) for box in boxes])
 
     snapped = snap_polygon(rooms)
 

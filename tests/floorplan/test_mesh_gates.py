@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import assume, given, settings
-from tests.meshed_homes import Home, all_homes, awkward_points, home_of
+from tests.meshed_homes import all_homes, awkward_points, home_of
 from tests.reference.line_of_sight import is_inside, touches_any_wall
 from tests.strategies import homes, seeds
 from tests.thorough import examples
@@ -12,16 +12,16 @@ from tests.thorough import examples
 from fleet2d._core import region_contains
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
-from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
+from fleet2d.floorplan.mesh import Gates, build_mesh
 from fleet2d.floorplan.rooms.doorways import DoorLine, fit_lines
-from fleet2d.kernels import I64, Bool, Mesh, line_of_sight, locate, visible_region
+from fleet2d.kernels import line_of_sight, locate, visible_region
 
 ROOM = [shapely.box(0, 0, 640, 640)]
-MIDDLE: Segment = ((320, 0), (320, 640))
+MIDDLE = ((320, 0), (320, 640))
 
 
-def with_doors(home: Home, rng: np.random.Generator, count: int) -> tuple[Home, list[Segment]]:
-    """Return the home with doors from wall to wall at random places and angles."""
+def with_gates(home, rng, count):
+    """Return the home with doors from wall to wall at random places and angles, and these."""
     lattice = Lattice(0.05, (0.0, 0.0), home.columns, home.rows)
     cells = home.cells
     lines = []
@@ -32,10 +32,12 @@ def with_doors(home: Home, rng: np.random.Generator, count: int) -> tuple[Home, 
         ends = lattice.to_metres([(x - 99 * dx, y - 99 * dy), (x + 99 * dx, y + 99 * dy)])
         lines.append(DoorLine(tuple(ends[0].tolist()), tuple(ends[1].tolist())))
     polygons, segments, _ = fit_lines(lattice, home.polygons, lines)
-    return home_of(polygons), [segment for segment in segments if segment is not None]
+    home, segments = home_of(polygons), [segment for segment in segments if segment is not None]
+    corners = [end for segment in segments for end in segment]
+    return home, segments, Gates(build_mesh(polygons, home.columns, home.rows, corners), segments)
 
 
-def verdicts(mesh: Mesh, eye: I64, points: I64) -> Bool:
+def verdicts(mesh, eye, points):
     """Return whether each point is visible, by the walk through the mesh."""
     x, y = eye.tolist()
     triangle = locate(mesh, x, y)
@@ -44,7 +46,7 @@ def verdicts(mesh: Mesh, eye: I64, points: I64) -> Bool:
     )
 
 
-def truth(home: Home, shut: list[Segment], eye: I64, points: I64) -> Bool:
+def truth(home, shut, eye, points):
     """Return whether each point is visible, by looking at every wall and every shut door."""
     walls = home.walls
     if shut:
@@ -53,11 +55,9 @@ def truth(home: Home, shut: list[Segment], eye: I64, points: I64) -> Bool:
     return inside[1:] & inside[0] & ~touches_any_wall(walls, eye, points)
 
 
-def compare(home: Home, rng: np.random.Generator, doors: int, eyes: int, points: int) -> int:
+def compare(home, rng, doors, eyes, points):
     """Compare all verdicts with some doors shut; return how many there were."""
-    home, segments = with_doors(home, rng, doors)
-    corners = [end for segment in segments for end in segment]
-    gates = Gates(build_mesh(home.polygons, home.columns, home.rows, corners), segments)
+    home, segments, gates = with_gates(home, rng, doors)
     pairs = 0
     for _ in range(eyes):
         shut = set(np.flatnonzero(rng.integers(2, size=len(segments))).tolist())
@@ -65,8 +65,8 @@ def compare(home: Home, rng: np.random.Generator, doors: int, eyes: int, points:
         lines = [segments[i] for i in sorted(shut)]
         eye = home.cells[rng.integers(len(home.cells))]
         targets = awkward_points(home, rng, points)
-        on_doors = [np.array(ends, np.int64) for line in segments for ends in (line,)]
-        targets = np.concatenate([targets, *[(e[:1] + e[1:]) // 2 for e in on_doors]])
+        on_doors = np.array(segments, np.int64).reshape(-1, 2, 2).sum(axis=1) // 2
+        targets = np.concatenate([targets, on_doors])
         answers = verdicts(mesh, eye, targets)
         np.testing.assert_array_equal(truth(home, lines, eye, targets), answers)
         pairs += len(targets)
@@ -91,9 +91,7 @@ def test_doors_of_real_homes_end_sight_exactly_as_walls(shared_data):
 def test_regions_follow_doors_as_single_sight_lines_do(polygons, seed):
     rng = np.random.default_rng(seed)
     assume(len(home_of(polygons).cells))
-    home, segments = with_doors(home_of(polygons), rng, 3)
-    corners = [end for segment in segments for end in segment]
-    gates = Gates(build_mesh(home.polygons, home.columns, home.rows, corners), segments)
+    home, segments, gates = with_gates(home_of(polygons), rng, 3)
     mesh = gates.shut(range(len(segments)))
     eye = home.cells[rng.integers(len(home.cells))]
     points = awkward_points(home, rng, 60)
@@ -101,12 +99,6 @@ def test_regions_follow_doors_as_single_sight_lines_do(polygons, seed):
     pieces = visible_region(mesh, x, y)
     inside = [region_contains(mesh, x, y, *pieces, *p) for p in points.tolist()]
     assert inside == truth(home, segments, eye, points).tolist()
-
-
-def test_all_doors_open_is_the_home_without_doors():
-    gates = Gates(build_mesh(ROOM, 10, 10, MIDDLE), [MIDDLE])
-    assert gates.shut(()) is gates.mesh
-    assert (gates.mesh.neighbors >= 0).sum() == 2 * (len(gates.mesh.triangles) - 1)
 
 
 def test_shutting_changes_nothing_of_the_mesh_that_was_handed_out():

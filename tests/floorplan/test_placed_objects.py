@@ -8,34 +8,18 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.placed_objects import (
     PlacedObject,
     UsePlace,
     describe_object,
     move_object,
-    number_objects,
 )
 
 LATTICE = Lattice(0.05, (0.0, 0.0), 200, 200)
 SOFA = PlacedObject(
     "sofa", "sofa", shapely.box(2, 2, 4, 3), uses=(UsePlace(3, 2.5, math.pi / 2, "sit"),)
 )
-
-
-def thing(name: str, kind: str = "chair") -> PlacedObject:
-    return PlacedObject(name, kind, shapely.box(0, 0, 0.5, 0.5))
-
-
-def test_objects_without_a_name_are_numbered_by_type_and_skip_own_names():
-    things = number_objects([thing(""), thing("chair_2"), thing(""), thing("", "bed")])
-    assert ["chair_1", "chair_2", "chair_3", "bed_1"] == [o.name for o in things]
-
-
-def test_two_objects_of_one_name_are_refused():
-    with pytest.raises(FloorPlanError, match="two objects are named 'a'"):
-        number_objects([thing("a"), thing("a")])
 
 
 def test_quarter_turn_is_exact():
@@ -51,11 +35,6 @@ def test_moved_object_keeps_its_size_to_the_lattice(turn, x, y):
     sofa = move_object(SOFA, LATTICE, (x, y), turn)
     assert sofa.footprint.area == pytest.approx(2, abs=0.01)
     assert sofa.footprint.centroid.x == pytest.approx(x, abs=0.002)
-
-
-def test_object_moved_back_is_where_it_was():
-    back = move_object(move_object(SOFA, LATTICE, (5, 5), 180), LATTICE, (3, 2.5), 180)
-    assert SOFA.footprint.equals(back.footprint)
 
 
 def test_descriptions_of_different_objects_differ():

@@ -8,7 +8,6 @@ from tests.reference.fields import squared_distance
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
-from fleet2d.floorplan.space import Space
 
 
 @pytest.fixture
@@ -54,20 +53,11 @@ def test_room_at_finds_rooms_and_nothing_in_walls_or_outside(flat):
     assert [None] * 4 == [flat.room_at(*at) for at in [(2.1, 0.5), (-3, 1), (1, 1e6), (9, -9)]]
 
 
-def test_room_by_name_or_index(flat):
-    assert flat.room("bedroom_1") is flat.room(1)
-
-
 def test_room_of_another_name_is_refused_with_the_nearest(flat):
     with pytest.raises(FloorPlanError, match=r"did you mean 'bedroom_1'.*kitchen_1, bedroom_1"):
         flat.room("bedrom_1")
     with pytest.raises(FloorPlanError, match="its rooms are 0 to 1"):
         flat.room(2)
-
-
-def test_rooms_of_type_honours_every_label(flat):
-    assert ("bedroom_1",) == tuple(room.name for room in flat.rooms_of_type("Office"))
-    assert () == flat.rooms_of_type("gym")
 
 
 def test_plans_are_equal_by_content(flat):
@@ -85,12 +75,6 @@ def test_copies_are_the_plan_itself_and_pickles_equal_it(flat):
     assert flat is copy.deepcopy(flat)
     assert flat is copy.copy(flat)
     assert flat == pickle.loads(pickle.dumps(flat))
-
-
-def test_arrays_of_a_plan_cannot_be_written(flat):
-    for array in (flat.free, flat.room_of_cell):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0, 0] = 1
 
 
 def test_holes_and_separate_parts_are_kept_and_noted():
@@ -111,14 +95,6 @@ def test_plan_too_thin_for_its_cells_is_refused_with_what_to_do():
         FloorPlan.build("closet", shapely.box(0.1, 0.1, 0.4, 0.9), cell=1.0)
     with pytest.raises(FloorPlanError, match=r"nothing is left of speck .*: choose a smaller"):
         FloorPlan.build("speck", shapely.box(0.1, 0.1, 0.105, 0.105), cell=1.0)
-
-
-@pytest.mark.parametrize(
-    "free", [shapely.Polygon(), shapely.Polygon([(0, 0), (1, 1), (2, 2)]), shapely.MultiPolygon()]
-)
-def test_plan_without_area_is_refused(free):
-    with pytest.raises(FloorPlanError, match="encloses no area"):
-        FloorPlan.build("line", free)
 
 
 def test_rounding_that_would_change_the_area_is_refused(monkeypatch):
@@ -153,21 +129,3 @@ def test_entrance_in_a_wall_is_refused_with_the_nearest_free_place():
         FloorPlanError, match=r"at \(-1, 2\) m is not in free space: .*\(0\.03, 1\.98\)"
     ):
         FloorPlan.build("flat", shapely.box(0, 0, 5, 3), entrance=(-1, 2))
-
-
-def test_nearest_free_of_a_free_place_is_its_cell(flat):
-    x, y = flat.nearest_free(1.01, 1.01)
-
-    assert (1.0258, 1.0258) == (round(x, 4), round(y, 4))
-    assert flat.room_at(*flat.nearest_free(1e9, -1e9)) is flat.room("bedroom_1")
-
-
-def test_repr_says_what_plan_it_is(flat):
-    assert "<FloorPlan flat: 14.6 m2, 2 rooms, 104 x 64 cells of 0.05 m>" == repr(flat)
-
-
-def test_a_body_reaches_both_rooms_through_the_door(flat):
-    space = Space(flat, radius=0.25)
-
-    assert 1 == space.parts
-    assert all(len(space.cells(room.index)) for room in flat.rooms)

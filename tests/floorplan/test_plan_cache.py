@@ -1,9 +1,7 @@
 """Homes that the runs of a process share: made once for each content, and read-only."""
 
 import json
-from typing import Any
 
-import numpy as np
 import pytest
 
 import fleet2d
@@ -66,19 +64,18 @@ def test_second_run_shares_plan_spaces_and_ratings():
 
 def test_changed_file_is_read_anew(tmp_path):
     path = tmp_path / "home.json"
-    content: dict[str, Any] = json.loads((HOMES / "family_home.json").read_text())
+    content = json.loads((HOMES / "family_home.json").read_text())
     path.write_text(json.dumps(content))
-    at = f"floorplan.path={path}"
-    first = fleet2d.Simulation(
-        "bundled:paper", "floorplan.type=native", at, SHORT, seed=4
-    ).home.plan
-    again = fleet2d.Simulation(
-        "bundled:paper", "floorplan.type=native", at, SHORT, seed=4
-    ).home.plan
+
+    def plan_of_a_run():
+        at = f"floorplan.path={path}"
+        return fleet2d.Simulation(
+            "bundled:paper", "floorplan.type=native", at, SHORT, seed=4
+        ).home.plan
+
+    first, again = plan_of_a_run(), plan_of_a_run()
     path.write_text(json.dumps({**content, "name": "another"}))
-    changed = fleet2d.Simulation(
-        "bundled:paper", "floorplan.type=native", at, SHORT, seed=4
-    ).home.plan
+    changed = plan_of_a_run()
 
     assert first is again
     assert (first.name, changed.name) == ("family_home", "another")
@@ -87,8 +84,8 @@ def test_changed_file_is_read_anew(tmp_path):
 def test_shared_arrays_are_read_only():
     simulation = fleet2d.Simulation("bundled:paper", SHORT, seed=4)
     plan, space = simulation.home.plan, simulation.home.space(0.15)
-    hangout: Any = next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
-    shared: list[np.ndarray[Any, Any]] = [
+    hangout = next(b for b in simulation.actors["astro"].behaviors if hasattr(b, "places"))
+    shared = [
         plan.free, plan.room_of_cell, plan.room_of_place, plan.mesh.vertices, space.part_of_cell,
         space.cells(), space.cells(2), hangout.nearness, hangout.places.points,
         hangout.places.room, hangout.places.block, hangout.places.prox,
@@ -109,15 +106,6 @@ def test_run_is_the_same_whatever_ran_before_in_its_home():
     simulation.run()
 
     assert alone == fleet2d.run("bundled:paper", SHORT, seed=4).digest
-
-
-def test_equal_floor_plans_have_spaces_of_their_own():
-    plans = [fleet2d.load_floorplan() for _ in range(2)]
-    first, second = (fleet2d.Home(plan) for plan in plans)
-
-    assert plans[0] == plans[1]
-    assert first.space(0.15) is not second.space(0.15)  # each belongs to its own plan
-    assert first.space(0.15).plan is plans[0]
 
 
 def test_a_folder_shares_a_home_among_processes_and_changes_no_run(tmp_path, monkeypatch):

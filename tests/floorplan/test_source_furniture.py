@@ -31,10 +31,6 @@ def test_piece_blocks_what_the_scenario_says():
     assert "sight" == plan.object("screen").blocks
 
 
-def test_no_pieces_and_no_rules_leave_the_plan_as_it_is():
-    assert load_floorplan() == Bundled().plan()
-
-
 @pytest.mark.parametrize(
     ("piece", "message"),
     [
@@ -45,16 +41,6 @@ def test_no_pieces_and_no_rules_leave_the_plan_as_it_is():
 def test_piece_that_stands_in_no_free_space_is_refused(piece, message):
     with pytest.raises(FloorPlanError, match=message):
         Bundled(furniture=[{**RUG, **piece}]).plan()
-
-
-def test_two_pieces_of_one_name_are_refused():
-    with pytest.raises(FloorPlanError, match="two objects are named 'mat'"):
-        Bundled(furniture=[{**RUG, "name": "mat"}] * 2).plan()
-
-
-def test_unknown_type_is_refused_with_the_nearest_name():
-    with pytest.raises(ScenarioError, match=r"furniture.0.type.*did you mean 'bed'"):
-        load_scenario("bundled:paper", "floorplan.furniture=[{type: bedd, at: [1, 1]}]")
 
 
 @pytest.mark.parametrize("piece", [{"size": [0, 1]}, {"size": [1]}, {"blocks": "light"}, {"x": 1}])

@@ -10,14 +10,12 @@ from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.floorplan.placed_objects import PlacedObject
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.homes.formats.drawing import Image
 from fleet2d.homes.synthetic.source import Synthetic
 
 
-def of_type(plan: FloorPlan, kind: str) -> list[PlacedObject]:
+def of_type(plan, kind):
     """Return the objects of a type."""
     return [thing for thing in plan.objects if thing.type == kind]
 
@@ -28,7 +26,7 @@ def test_scale_multiplies_lengths_of_every_format(kind, tmp_path):
     path = write(tmp_path, name, content)
     (tmp_path / "map.pgm").write_bytes(PGM)
 
-    def read(cell: float, scale: float | None) -> FloorPlan:
+    def read(cell, scale):
         source = lookup("floorplan", kind).model_validate(
             {"path": path, "cell": cell, "scale": scale}
         )
@@ -89,16 +87,3 @@ def test_home_in_another_unit_is_told_with_the_line_to_type(scale):
         text = str(error)
 
     assert f"floorplan.scale={1 / scale:.3g}" in text
-
-
-def test_unit_is_told_by_the_width_of_doors():
-    in_feet = Synthetic(seed=3, scale=3.28084).plan()
-    (finding,) = [f for f in checkup(in_feet) if f.kind == "scale"]
-
-    assert "wrong" == finding.severity
-    assert "doors the plan is in feet: floorplan.scale=0.3048" in finding.text
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_home_in_metres_has_no_finding_on_its_scale(seed):
-    assert [] == [f for f in checkup(Synthetic(seed=seed).plan()) if f.kind == "scale"]

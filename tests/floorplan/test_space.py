@@ -2,9 +2,7 @@
 
 import copy
 import math
-from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +10,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
-from shapely.geometry.base import BaseGeometry
-from tests.meshed_homes import plan_files, walls_of
+from tests.meshed_homes import walls_of
 from tests.reference.line_of_sight import visible
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, rectilinear_homes, seeds
@@ -32,7 +29,6 @@ from fleet2d.floorplan.space import (
     grow_polygons,
     grow_shape,
 )
-from fleet2d.kernels import F64, I64
 
 UNITS_PER_M = 1280
 RADII = (0.15, 0.2, 0.3)
@@ -55,46 +51,46 @@ HOMES = some(
 
 
 @cache
-def plan_of(path: Path) -> FloorPlan:
+def plan_of(path):
     """Return a plan of HouseExpo."""
     return load_floorplan(path)
 
 
 @cache
-def space_of(path: Path, radius: float) -> Space:
+def space_of(path, radius):
     """Return the space of a body in a plan of HouseExpo."""
     return Space(plan_of(path), radius)
 
 
-def build_plan(free: shapely.Geometry) -> FloorPlan:
+def build_plan(free):
     """Return the plan of free space in metres."""
     return FloorPlan.build("test home", free)
 
 
-def walls_around(plan: FloorPlan) -> shapely.Geometry:
+def walls_around(plan):
     """Return all walls as lines."""
     walls = shapely.multilinestrings([p.boundary for p in _rings(plan)])
     shapely.prepare(walls)
     return walls
 
 
-def _rings(plan: FloorPlan) -> list[Polygon]:
+def _rings(plan):
     return [Polygon(r) for p in plan.polygons for r in (p.exterior, *p.interiors)]
 
 
-def region(space: Space) -> shapely.Geometry:
+def region(space):
     """Return the closed space."""
     return region_of(space.mesh.vertices, space.mesh.triangles)
 
 
-def cells_of(space: Space, rng: np.random.Generator, count: int) -> I64:
+def cells_of(space, rng, count):
     """Return centres of random cells of the space, of any part."""
     rows, columns = np.nonzero(space.part_of_cell >= 0)
     chosen = rng.integers(0, len(rows), count)
     return np.stack([64 * columns[chosen] + 33, 64 * rows[chosen] + 33], axis=1)
 
 
-def check_routes(space: Space, rng: np.random.Generator, count: int) -> int:
+def check_routes(space, rng, count):
     """Check routes against the twin and the distance from walls; return how many bend."""
     vertices, free = space.mesh.vertices, region(space)
     graph, walls = graph_of(free, vertices), walls_around(space.plan)
@@ -132,7 +128,7 @@ def test_routes_in_random_homes_are_shortest(polygons, seed, radius):
         check_routes(space, np.random.default_rng(seed), 4)
 
 
-def space_in(polygons: list[Polygon], radius: float) -> Space | None:
+def space_in(polygons, radius):
     """Return the space of a body in free space [lattice], or None where there is none."""
     free = shapely.transform(shapely.MultiPolygon(polygons), lambda xy: xy / UNITS_PER_M)
     try:
@@ -141,7 +137,7 @@ def space_in(polygons: list[Polygon], radius: float) -> Space | None:
         return None
 
 
-def _is_pinched(space: Space) -> bool:
+def _is_pinched(space):
     """Return whether more than two walls of the space meet in a point, where a body is stuck."""
     triangle, k = np.nonzero(space.mesh.neighbors < 0)
     starts = space.mesh.triangles[triangle, k]
@@ -182,38 +178,32 @@ def test_clearance_from_a_wall_at_any_angle_is_as_stated(degrees):
         assert clearance.max() > reach * 1.07
 
 
-def two_rooms(width: float, offset: float, thickness: float = 0.1) -> shapely.Geometry:
+def two_rooms(width, offset, thickness=0.1):
     """Return two rooms of 2 x 3 m and a doorway between them."""
     door = shapely.box(2, offset, 2 + thickness, offset + width)
     return shapely.union_all([shapely.box(0, 0, 2, 3), shapely.box(2 + thickness, 0, 4, 3), door])
 
 
-@pytest.mark.parametrize("radius", [0.1, 0.15, 0.2, 0.25, 0.3])
+@pytest.mark.parametrize("radius", [0.1, 0.15, 0.217, 0.3])
 @pytest.mark.parametrize("offset", [1.0, 1.0137, 0.77])
 @pytest.mark.parametrize("upright", [True, False])
-def test_a_body_passes_a_doorway_two_centimetres_wider_and_none_narrower(radius, offset, upright):
-    for spare, passes in ((0.02, True), (-0.02, False)):
+def test_a_body_passes_a_doorway_a_centimetre_wider_and_none_narrower(radius, offset, upright):
+    """The lattice takes at most 2 * 5 units, which is 8 mm."""
+    for spare, passes in ((0.0095, True), (-0.001, False)):
         free = two_rooms(2 * radius + spare, offset)
+        ends = [(1.0, 0.6), (3.0, 2.4)]
         if upright:
             free = shapely.transform(free, lambda xy: xy[:, ::-1])
+            ends = [(y, x) for x, y in ends]
         space = Space(build_plan(free), radius)
-        first, second = ((1.0, 0.6), (3.0, 2.4)) if not upright else ((0.6, 1.0), (2.4, 3.0))
-        start, goal = (space.plan.lattice.to_lattice(at).tolist() for at in (first, second))
 
-        path = space.route(tuple(start), tuple(goal))
+        path = space.route(*(space.plan.lattice.point_at(end) for end in ends))
 
         assert passes == (path is not None)
         assert space.parts == (1 if passes else 2)
 
 
-def test_a_doorway_needs_less_than_a_centimetre_to_spare():
-    """The lattice takes at most 2 * 5 units, which is 8 mm."""
-    for radius in np.arange(0.1, 0.4, 0.0137).tolist():
-        assert Space(build_plan(two_rooms(2 * radius + 0.0095, 1.0)), radius).parts == 1
-        assert Space(build_plan(two_rooms(2 * radius - 0.001, 1.0)), radius).parts == 2
-
-
-def moves(plan: FloorPlan) -> list[F64]:
+def moves(plan):
     """Return matrices that mirror and turn a plan, with a shift by whole cells."""
     width, height = 64.0 * plan.lattice.columns, 64.0 * plan.lattice.rows
     return [
@@ -223,22 +213,6 @@ def moves(plan: FloorPlan) -> list[F64]:
         np.array([[0, 1, 0], [1, 0, 0]]),
         np.array([[0, 1, 0], [-1, 0, width]]),
     ]
-
-
-def check_symmetry(plan: FloorPlan, radius: float, slip: float) -> None:
-    """Check that the space of the moved home is the moved space, up to `slip` lattice units."""
-    original = region(Space(plan, radius))
-    for move in moves(plan):
-
-        def transform(shape: shapely.Geometry, move: F64 = move) -> Polygon:
-            return shapely.transform(shape, lambda xy: xy @ move[:, :2].T + move[:, 2])
-
-        walls = shapely.union_all([transform(polygon) for polygon in plan.polygons])
-        other = build_plan(shapely.transform(walls, lambda xy: xy / UNITS_PER_M))
-        shift = other.lattice.to_lattice((0.0, 0.0))
-        expected = shapely.transform(transform(original), lambda xy, shift=shift: xy + shift)
-
-        assert shapely.hausdorff_distance(expected, region(Space(other, radius))) <= slip
 
 
 @pytest.mark.parametrize("radius", [0.2, 0.217])
@@ -251,15 +225,19 @@ def test_space_of_a_turned_and_mirrored_home_is_the_same(radius):
     ]
     home = shapely.box(0, 0, 5, 4).difference(shapely.union_all(pillars))
 
-    check_symmetry(build_plan(home), radius, 0.0)
+    plan = build_plan(home)
+    original = region(Space(plan, radius))
+    for move in moves(plan):
 
+        def moved(shape, move=move):
+            return shapely.transform(shape, lambda xy: xy @ move[:, :2].T + move[:, 2])
 
-@pytest.mark.parametrize("name", HOMES)
-def test_space_of_a_turned_and_mirrored_real_home_is_the_same_to_the_grid_of_walls(
-    shared_data, name
-):
-    """Where two slanted sides meet in the middle between two wall points, rounding picks one."""
-    check_symmetry(plan_of(shared_data / "houseexpo" / f"{name}.json"), 0.2, 2.0)
+        walls = shapely.union_all([moved(polygon) for polygon in plan.polygons])
+        other = build_plan(shapely.transform(walls, lambda xy: xy / UNITS_PER_M))
+        shift = other.lattice.to_lattice((0.0, 0.0))
+        expected = shapely.transform(moved(original), lambda xy, shift=shift: xy + shift)
+
+        assert 0 == shapely.hausdorff_distance(expected, region(Space(other, radius)))
 
 
 def test_route_from_the_border_of_the_space_first_leads_inside():
@@ -285,31 +263,23 @@ def test_route_from_beside_a_wall_does_not_step_through_it():
     rooms = shapely.box(0, 0, 4, 3).difference(shapely.box(2, 0, 2.02, 2.2))
     space = Space(build_plan(rooms), 0.2)
     lattice = space.plan.lattice
-    start, goal = (tuple(lattice.to_lattice(at).tolist()) for at in ((2.03, 1.0), (1.0, 1.0)))
 
-    path = space.route(start, goal)
+    path = space.route(lattice.point_at((2.03, 1.0)), lattice.point_at((1.0, 1.0)))
 
     assert path is not None
     assert lattice.to_metres(path[1])[0] > 2.2
     assert len(path) > 4
 
 
-def test_route_from_a_wall_or_outside_is_none():
+@pytest.mark.parametrize("at", [(0.0, 1.0), (2.05, 0.5), (-0.05, 1.0), (50.0, 50.0)])
+def test_no_route_leads_from_a_wall_or_outside_or_to_a_place_without_room(at):
     space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
-    lattice = space.plan.lattice
-    goal = tuple(lattice.to_lattice((3.0, 2.4)).tolist())
+    place = space.plan.lattice.point_at
+    inside = place((3.0, 2.4))
 
-    for at in ((0.0, 1.0), (2.05, 0.5), (-0.05, 1.0), (50.0, 50.0)):
-        assert space.route(tuple(lattice.to_lattice(at).tolist()), goal) is None
-
-
-def test_route_to_a_place_without_room_is_none():
-    space = Space(build_plan(two_rooms(0.9, 1.0)), 0.2)
-    lattice = space.plan.lattice
-    start = tuple(lattice.to_lattice((3.0, 2.4)).tolist())
-
-    assert space.route(start, tuple(lattice.to_lattice((0.1, 0.1)).tolist())) is None
-    assert space.route(start, tuple(lattice.to_lattice((2.05, 0.5)).tolist())) is None
+    assert space.route(place(at), inside) is None
+    assert space.route(inside, place((0.1, 0.1))) is None
+    assert space.route(inside, place((2.05, 0.5))) is None
 
 
 def test_route_to_the_border_of_the_space_is_none():
@@ -326,48 +296,32 @@ def test_route_to_the_border_of_the_space_is_none():
         assert space.route(tuple(start), tuple((goal + 1).tolist())) is not None
 
 
-def test_spaces_of_all_homes_number_their_parts_by_size(shared_data):
-    paths = plan_files(shared_data)
-    for path in paths:
-        for radius in RADII:
-            space = space_of(path, radius)
-            sizes = [np.count_nonzero(space.part_of_cell == i) for i in range(space.parts)]
-            assert space.parts >= 1
-            assert sizes == sorted(sizes, reverse=True)
-            assert sum(sizes) == np.count_nonzero(space.part_of_cell >= 0)
-            assert len(space.routes.leg_end) == space.routes.leg_start[-1]
-
-
 @pytest.mark.parametrize("radius", [1.01, 5.0])
 def test_space_of_a_body_too_wide_for_the_home_says_so(radius):
     with pytest.raises(FloorPlanError, match=r"fits nowhere in test home: give it a smaller"):
         Space(build_plan(shapely.box(0, 0, 2, 2)), radius)
 
 
+TWO_PARTS = shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])
+
+
 def test_parts_are_numbered_from_the_largest():
-    space = Space(
-        build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
-    )
-    lattice = space.plan.lattice
+    space = Space(build_plan(TWO_PARTS), 0.2)
+    places = [space.plan.lattice.point_at((x, 1.0)) for x in (5.0, 1.0, 2.5)]
 
     assert space.parts == 2
-    assert space.part_at(*lattice.to_lattice((5.0, 1.0)).tolist()) == 0
-    assert space.part_at(*lattice.to_lattice((1.0, 1.0)).tolist()) == 1
-    assert space.part_at(*lattice.to_lattice((2.5, 1.0)).tolist()) == -1
+    assert [0, 1, -1] == [space.part_at(*place) for place in places]
     assert len(space.cells(None, 0)) > len(space.cells(None, 1)) > 0
 
 
 def test_nearest_is_the_nearest_cell_of_the_part():
-    space = Space(
-        build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
-    )
+    space = Space(build_plan(TWO_PARTS), 0.2)
     x, y = space.plan.lattice.to_lattice((2.9, 1.01)).tolist()
 
     for part in (None, 0, 1):
-        rows, columns = np.nonzero(
-            space.part_of_cell >= 0 if part is None else space.part_of_cell == part
-        )
-        centres = [(64 * c + 33, 64 * r + 33) for r, c in zip(rows, columns, strict=True)]
+        parts = space.part_of_cell
+        cells = np.argwhere(parts >= 0 if part is None else parts == part).tolist()
+        centres = [(64 * column + 33, 64 * row + 33) for row, column in cells]
         expected = min(centres, key=lambda at: ((at[0] - x) ** 2 + (at[1] - y) ** 2, at[1], at[0]))
 
         assert expected == space.nearest(x, y, part)
@@ -379,9 +333,7 @@ def test_nearest_is_the_nearest_cell_of_the_part():
 )
 @pytest.mark.parametrize("most", [1, 350, 600, 1000, 100_000])
 def test_free_cells_by_distance_are_those_of_the_whole_home_in_order(at, most):
-    space = Space(
-        build_plan(shapely.union_all([shapely.box(0, 0, 2, 2), shapely.box(3, 0, 7, 2)])), 0.2
-    )
+    space = Space(build_plan(TWO_PARTS), 0.2)
     x, y = space.plan.lattice.point_at(at)
     cells = np.argwhere(space.part_of_cell >= 0)
     away = ((cells[:, ::-1] * 64 + 33 - [x, y]) ** 2).sum(axis=1)
@@ -440,9 +392,7 @@ def test_distances_of_points_are_the_same_measured_from_the_places_and_from_the_
     assert np.isinf([distances.of(place) for place in map(centre, rows, columns)]).any()
 
 
-def moved_and_grown(
-    polygons: list[Polygon], radius: float
-) -> Iterator[tuple[Polygon | None, BaseGeometry]]:
+def moved_and_grown(polygons, radius):
     """Yield what is left of each polygon by moving its walls, and by growing them."""
     for polygon in polygons:
         rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(polygon)]

@@ -11,7 +11,7 @@ from tests.strategies import quick
 
 from fleet2d.floorplan.furniture import stand_furniture
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
+from fleet2d.floorplan.placed_objects import UsePlace
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.space import (
     SLACK,
@@ -113,9 +113,3 @@ def test_place_inside_a_wall_has_no_approach(plan):
     use = UsePlace(-0.3, 1.0, 0.0, "sit")
 
     assert nearest_standing(plan, use, standing_cells(plan, 0.2), 1.0) is None
-
-
-def test_object_without_uses_stays_as_it_is(plan):
-    thing = PlacedObject("plinth", "plinth", shapely.box(1, 1, 2, 2))
-
-    assert thing == with_approaches(plan, thing, standing_cells(plan, 0.2))

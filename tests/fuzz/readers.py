@@ -56,13 +56,13 @@ class Reader:
     cost: int = 1
 
 
-def _yaml(*seeds: Any) -> st.SearchStrategy[bytes]:
+def _yaml(*seeds):
     texts = [yaml.safe_dump(seed, sort_keys=False).encode() for seed in seeds]
     changed = st.one_of(*map(structures, seeds)).map(_dumped)
     return st.one_of(changed, changed, *map(pieces, texts))
 
 
-def _dumped(content: Any) -> bytes:
+def _dumped(content):
     try:
         return yaml.safe_dump(content, sort_keys=False, allow_unicode=True).encode(
             "utf-8", "replace"
@@ -71,7 +71,7 @@ def _dumped(content: Any) -> bytes:
         return b"{}"
 
 
-def _json(*seeds: Any) -> st.SearchStrategy[bytes]:
+def _json(*seeds):
     texts = [json.dumps(seed).encode() for seed in seeds]
     changed = st.one_of(*map(structures, seeds)).map(lambda c: json.dumps(c).encode())
     return st.one_of(changed, changed, *map(pieces, texts))
@@ -80,7 +80,7 @@ def _json(*seeds: Any) -> st.SearchStrategy[bytes]:
 # --- Scenarios ---------------------------------------------------------------------------------
 
 
-def _scenario() -> dict[str, Any]:
+def _scenario():
     days = [{"on": "weekdays", "items": [{"at": "07:00", "place": "kitchen", "dwell": "20 min"}]}]
     content = scenario(
         "1 h",
@@ -104,7 +104,7 @@ def _scenario() -> dict[str, Any]:
     return content
 
 
-def _study() -> dict[str, Any]:
+def _study():
     return {
         "base": _scenario(),
         "axes": {"robots.astro.speed": [0.3, 0.6], "who": {"options": {"a": {"name": "x"}}}},
@@ -115,19 +115,19 @@ def _study() -> dict[str, Any]:
     }
 
 
-def _persona() -> Any:
+def _persona():
     return yaml.safe_load((PERSONAS / "works_from_home.yaml").read_text())
 
 
-def _safely(read: Callable[[Path], Any]) -> Callable[[Path], Any]:
-    def wrapped(path: Path) -> Any:
+def _safely(read):
+    def wrapped(path):
         with running_code(allowed=False):
             return read(path)
 
     return wrapped
 
 
-def _lives_by(path: Path) -> Any:
+def _lives_by(path):
     user = {"type": "routine", "persona": str(path)}
     return load_scenario({"extends": "bundled:paper", "users": {"ana": user}})
 
@@ -135,7 +135,7 @@ def _lives_by(path: Path) -> Any:
 # --- Runs --------------------------------------------------------------------------------------
 
 
-def _read_run(path: Path) -> None:
+def _read_run(path):
     """Open a run, use all of it, and compare it with its seal."""
     folder = path if path.is_dir() else path.parent
     try:
@@ -150,17 +150,17 @@ def _read_run(path: Path) -> None:
         verify_run(folder)
 
 
-def _run_beside(folder: Path) -> None:
+def _run_beside(folder):
     shutil.copytree(RUN, folder, dirs_exist_ok=True)
 
 
 @cache
-def _manifest() -> Any:
+def _manifest():
     return json.loads((RUN / "manifest.json").read_text())
 
 
 @cache
-def _unfinished() -> dict[str, bytes]:
+def _unfinished():
     """The files of a run that was interrupted."""
     import tempfile
 
@@ -176,14 +176,14 @@ def _unfinished() -> dict[str, bytes]:
         }
 
 
-def _unfinished_beside(folder: Path) -> None:
+def _unfinished_beside(folder):
     for name, content in _unfinished().items():
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(content)
 
 
-def _resume(path: Path) -> None:
+def _resume(path):
     """Open an unfinished run, and set it up to go on."""
     from fleet2d.engine.repeat import reopen
 
@@ -198,13 +198,13 @@ def _resume(path: Path) -> None:
 
 
 @cache
-def _learned() -> dict[str, Any]:
+def _learned():
     with np.load(RUN / "learned" / "ltp.npz") as file:
         return {name: file[name] for name in file.files}
 
 
 @st.composite
-def _learned_states(draw: st.DrawFn) -> bytes:
+def _learned_states(draw):
     arrays = dict(_learned())
     for _ in range(draw(st.integers(1, 3))):
         name = draw(st.sampled_from(sorted(arrays) or ["x"]))
@@ -235,19 +235,17 @@ def _learned_states(draw: st.DrawFn) -> bytes:
     return target.getvalue()
 
 
-def _start_from(path: Path) -> None:
+def _start_from(path):
     load_learned(path)
     algorithms = {"ltp": {"learned": str(path)}}
-    users = dict.fromkeys(("ben",))
     changes = {"simulation": {"duration": "7 h"}, "algorithms": algorithms}
-    del users
     fleet2d.Simulation({"extends": "bundled:paper", **changes}, seed=4)
 
 
 # --- Tables ------------------------------------------------------------------------------------
 
 
-def _parquet(columns: dict[str, Any]) -> bytes:
+def _parquet(columns):
     target = io.BytesIO()
     pq.write_table(pa.table(columns), target)
     return target.getvalue()
@@ -276,7 +274,7 @@ MESSAGE = {
 }  # fmt: skip
 
 
-def _perceive(path: Path) -> None:
+def _perceive(path):
     """Read what a real robot perceived, and let one perceive it."""
     source = {"type": "replay", "path": str(path), "time_zone": "UTC", "sort": True}
     robot = {"perceives": source, "behaviors": [{"type": "patrol"}]}
@@ -284,18 +282,18 @@ def _perceive(path: Path) -> None:
     fleet2d.run({**home, "simulation": {**home["simulation"], "start": "2020-03-02"}})
 
 
-def _post(path: Path) -> None:
+def _post(path):
     """Read a message to a live run."""
     parse_message(path.read_bytes())
 
 
-def _words(text: str) -> Callable[[], st.SearchStrategy[bytes]]:
+def _words(text):
     """Changes to the cells of a table as to the words of a log."""
     spaced = text.replace(",", " , ")
     return lambda: lines(spaced).map(lambda content: content.replace(b" , ", b","))
 
 
-def _replay(path: Path) -> None:
+def _replay(path):
     """Read a log, and live by it."""
     read_log(path, time_zone="UTC")
     user = {"type": "replay", "path": str(path), "time_zone": "UTC", "sort": True}
@@ -305,16 +303,22 @@ def _replay(path: Path) -> None:
     fleet2d.Simulation({**home, "simulation": {**home["simulation"], "start": "2020-03-02"}})
 
 
-def _plan(kind: str) -> Reader:
+def _plan(kind):
     name, content, _ = FORMATS[kind]
     make = _yaml if name.endswith("yaml") else _json
     return Reader(
-        kind, name, lambda: make(content), load_floorplan,
-        lambda folder: (folder / "map.pgm").write_bytes(PGM), cost=3,
+        kind, name, lambda: make(content), _home, lambda folder: (folder / "map.pgm").write_bytes(PGM)
     )  # fmt: skip
 
 
-def _png() -> bytes:
+def _home(path):
+    """Read a home, which has free space, and rooms on all of it."""
+    plan = load_floorplan(path)
+    assert plan.free.any()
+    assert np.array_equal(plan.free, plan.room_of_cell >= 0)
+
+
+def _png():
     from PIL import Image
 
     target = io.BytesIO()
@@ -324,7 +328,7 @@ def _png() -> bytes:
     return target.getvalue()
 
 
-def _drawing(path: Path) -> Any:
+def _drawing(path):
     return load_floorplan(path, resolution=0.1)
 
 

@@ -1,48 +1,41 @@
-"""Damaged files of every format are refused in plain words, or repaired with a note."""
+"""Damaged files of every format are refused in plain words, or repaired with a note.
+
+That anything wrong anywhere is read or refused is what `tests/fuzz` is for.
+"""
 
 import copy
 import json
 import math
 import zlib
-from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from tests.thorough import examples
 
 from fleet2d.configuration.components import components, lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.homes.formats.drawing import Image
 from fleet2d.homes.formats.ros import Ros
-
-Place = tuple[Any, ...]
 
 PIXELS = np.full((30, 40), 205, np.uint8)
 PIXELS[2:-2, 2:-2] = 0
 PIXELS[4:-4, 4:-4] = 254
 PGM = b"P5\n# map\n40 30\n255\n" + PIXELS.tobytes()
 
-Read = Callable[[Path], FloorPlan]
 
-
-def read_as(kind: str, path: Path) -> FloorPlan:
+def read_as(kind, path):
     """Read a file by the reader of a format."""
     source = lookup("floorplan", kind).model_construct(path=path)
     assert isinstance(source, FloorPlanSource)
     return source.load()
 
 
-def formats() -> dict[str, tuple[str, dict[str, Any], Read]]:
+def formats():
     """Name, content and reader of the `SAMPLE` of each format's test, by the format."""
     paths = sorted(Path(__file__).parent.glob("formats/test_*.py"))
     names = [path.stem for path in paths if "\nSAMPLE" in path.read_text(encoding="utf-8")]
@@ -57,7 +50,7 @@ FORMATS = formats()
 ROS = FORMATS["ros"][1]
 
 
-def write(folder: Path, name: str, content: object) -> Path:
+def write(folder, name, content):
     path = folder / name
     dump = yaml.safe_dump if path.suffix == ".yaml" else json.dumps
     path.write_text(dump(content), encoding="utf-8")
@@ -65,8 +58,8 @@ def write(folder: Path, name: str, content: object) -> Path:
     return path
 
 
-def png(width: int, height: int, rows: bytes) -> bytes:
-    def chunk(kind: bytes, body: bytes) -> bytes:
+def png(width, height, rows):
+    def chunk(kind, body):
         check = zlib.crc32(kind + body).to_bytes(4, "big")
         return len(body).to_bytes(4, "big") + kind + body + check
 
@@ -77,15 +70,15 @@ def png(width: int, height: int, rows: bytes) -> bytes:
 every_format = pytest.mark.parametrize("kind", FORMATS)
 
 
-def read_ros(path: Path) -> FloorPlan:
+def read_ros(path):
     return Ros.model_construct(path=path).load()
 
 
-def read_image(path: Path, resolution: float) -> FloorPlan:
+def read_image(path, resolution):
     return Image.model_construct(path=path, resolution=resolution).load()
 
 
-def refusal(read: Callable[..., object], path: Path, *arguments: Any) -> str:
+def refusal(read, path, *arguments):
     with pytest.raises(FloorPlanError) as caught:
         read(path, *arguments)
     assert path.name in str(caught.value)
@@ -168,7 +161,7 @@ def test_missing_file_and_folder_are_refused(tmp_path, kind):
 
 # --- Outlines that are none -------------------------------------------------------------------------
 
-OUTLINES: dict[str, Any] = {
+OUTLINES = {
     "nan": [[0, 0], [4, math.nan], [4, 3], [0, 3]],
     "infinity": [[0, 0], [4, 0], [4, math.inf], [0, 3]],
     "zero area": [[0, 0], [4, 0], [2, 0]],
@@ -183,7 +176,7 @@ OUTLINES: dict[str, Any] = {
 }
 
 
-def with_outline(kind: str, outline: Any) -> dict[str, Any]:
+def with_outline(kind, outline):
     content = copy.deepcopy(FORMATS[kind][1])
     if kind == "houseexpo":
         content["verts"] = outline
@@ -246,15 +239,6 @@ def test_tiny_coordinate_is_zero(tmp_path, kind):
     assert 6 == pytest.approx(read(path).area_m2, abs=0.01)
 
 
-@pytest.mark.slow
-@vector_format
-def test_outline_of_9_000_m2_is_read(tmp_path, kind):
-    name, _, read = FORMATS[kind]
-    path = write(tmp_path, name, with_outline(kind, [[0, 0], [100, 0], [100, 90], [0, 90]]))
-
-    assert 9000 == pytest.approx(read(path).area_m2)
-
-
 # --- Images -----------------------------------------------------------------------------------------
 
 IMAGES = {
@@ -300,113 +284,3 @@ def test_invalid_resolution_is_refused(tmp_path, resolution):
     write(tmp_path, "map.yaml", ROS)
 
     assert "resolution is" in refusal(read_image, tmp_path / "map.pgm", resolution)
-
-
-@settings(
-    max_examples=examples(60),
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-    deadline=None,
-)
-@given(st.binary(max_size=80), st.integers(0, len(PGM)), st.booleans())
-def test_image_with_other_bytes_somewhere_is_read_or_refused(tmp_path, other, place, insert):
-    write(tmp_path, "map.yaml", ROS)
-    rest = PGM[place if insert else place + len(other) :]
-    (tmp_path / "map.pgm").write_bytes(PGM[:place] + other + rest)
-
-    read_or_refused(read_ros, tmp_path / "map.yaml")
-
-
-# --- Anything wrong anywhere ------------------------------------------------------------------------
-
-WRONG = (
-    *(
-        None,
-        True,
-        False,
-        "",
-        "x",
-        "0",
-        0,
-        -1,
-        1,
-        0.5,
-        -0.0,
-        1e-300,
-        1e5,
-        2**40,
-        10**400,
-        -(10**400),
-    ),
-    *(
-        math.nan,
-        math.inf,
-        -math.inf,
-        1e308,
-        [],
-        {},
-        [[]],
-        [{}],
-        {"": 0},
-        [0, 0],
-        [[0, 0]],
-        "\ud800",
-    ),
-    *([1, 2, 3], [[1, 2], [3, 4], [5, 6]], {"en": 3}, "a/b\x00c", "x" * 1000, 7, 3.5),
-)
-
-
-def places(value: Any, path: Place = ()) -> Iterator[Place]:
-    """Every place in a document."""
-    if isinstance(value, dict | list):
-        for key in value if isinstance(value, dict) else range(len(value)):
-            yield (*path, key)
-            yield from places(value[key], (*path, key))
-
-
-def change(content: Any, place: Place, what: Any) -> None:
-    inner = content
-    try:
-        for key in place[:-1]:
-            inner = inner[key]
-        if what is places:
-            del inner[place[-1]]
-        else:
-            inner[place[-1]] = what
-    except (LookupError, TypeError):
-        pass  # what was there went with an earlier change
-
-
-def read_or_refused(read: Read, path: Path) -> None:
-    try:
-        plan = read(path)
-    except FloorPlanError as error:
-        message = str(error)
-    else:
-        assert plan.free.any()
-        assert np.array_equal(plan.free, plan.room_of_cell >= 0)
-        return
-    assert path.name in message
-    assert len(message) < 3000
-
-
-@pytest.mark.slow
-@every_format
-@settings(
-    max_examples=examples(250),
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-    deadline=None,
-)
-@given(st.data())
-def test_wrong_things_anywhere_are_read_or_refused(tmp_path, kind, data):
-    name, content, read = FORMATS[kind]
-    damaged = copy.deepcopy(content)
-    where = st.tuples(st.sampled_from(list(places(content))), st.sampled_from((*WRONG, places)))
-    for place, what in data.draw(st.lists(where, min_size=1, max_size=3)):
-        change(damaged, place, copy.deepcopy(what))
-    try:
-        path = write(tmp_path, name, damaged)
-    except UnicodeEncodeError:
-        return  # no file can hold that
-
-    read_or_refused(read, path)
-    read_or_refused(load_floorplan, path)

@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.viewing.contract import LIVE_ORDER, LiveOrder, read_body
+from fleet2d.viewing.contract import LIVE_ORDER, read_body
 from fleet2d.viewing.live import LiveRun
 from fleet2d.viewing.live_runs import LiveRuns
 from fleet2d.viewing.page_data import PageData
@@ -20,11 +20,11 @@ OWN = f"http://127.0.0.1:{PORT}"
 DOOR = "objects.bath_door={type: door, doorway: bathroom_1}"
 
 
-def simulation(duration: str = "8 h") -> fleet2d.Simulation:
+def simulation(duration="8 h"):
     return fleet2d.Simulation("bundled:paper", f"simulation.duration={duration}", DOOR, seed=4)
 
 
-def order(action: str, target: str = "", value: float = 0, x: float = 0, y: float = 0) -> LiveOrder:
+def order(action, target="", value=0, x=0, y=0):
     content = {"action": action, "target": target, "value": value, "x": x, "y": y}
     return read_body(json.dumps({**content, "key": "", "text": ""}).encode(), LIVE_ORDER, "")
 
@@ -99,12 +99,6 @@ def test_beliefs_in_frames_sum_to_one_and_are_of_everybody():
     sums = [sum(s) for each in beliefs for users in each.values() for s in users.values()]
     assert sums == pytest.approx([1.0] * len(sums))
     assert max(users["ana"][-1] for each in beliefs for users in each.values()) > 0  # away
-
-
-def test_steps_are_taken_one_by_one(live):
-    assert "" == live.submit(order("step", value=1))
-    assert "" == live.submit(order("step", value=60))
-    assert 61 == live.engine.simulation.step
 
 
 def test_body_is_put_somewhere_and_the_run_says_so(live):

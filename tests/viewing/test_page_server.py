@@ -5,7 +5,6 @@ import json
 import shutil
 import socket
 from datetime import timedelta
-from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -15,7 +14,7 @@ import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.viewing import page_server
 from fleet2d.viewing.page_data import PageData
-from fleet2d.viewing.page_server import PageServer, kept_token, new_token, page_app
+from fleet2d.viewing.page_server import PageServer, kept_token, page_app
 from fleet2d.viewing.served_runs import ServedRuns
 
 TOKEN = "0123456789abcdefghijABCDEFGHIJ01"
@@ -114,16 +113,10 @@ def test_browser_that_comes_before_the_server_runs_is_not_refused(run_dir):
         server.close()
 
 
-def test_tokens_differ_and_are_long():
-    tokens = {new_token() for _ in range(100)}
-    assert 100 == len(tokens)
-    assert min(map(len, tokens)) >= 32
-
-
 BASE = f"http://127.0.0.1:{PORT}"
 
 
-def client_of(*sources: Path | PageData) -> TestClient:
+def client_of(*sources):
     return TestClient(page_app(ServedRuns(sources), "token", PORT), base_url=f"{BASE}/token/")
 
 
@@ -141,12 +134,6 @@ def test_page_and_its_parts_are_served(run_dir):
     assert client.get("page.css").headers["content-type"].startswith("text/css")
 
 
-def test_session_names_all_runs(run_dir, other_dir):
-    session = client_of(run_dir, other_dir).get("session.json").json()
-    assert ["first", "second"] == session["runs"]
-    assert not session["live"]
-
-
 def test_facts_are_those_of_the_run(run_dir):
     facts = client_of(run_dir).get("run/0/facts.json").json()
     run = fleet2d.open_run(run_dir)
@@ -160,12 +147,6 @@ def test_facts_are_those_of_the_run(run_dir):
     assert ("algorithm", "layer", "log", "metric") == (
         roles["ltp"], roles["layer.dust"], roles["events"], roles["room_share"],
     )  # fmt: skip
-
-
-def test_part_of_a_table_is_served_by_range(run_dir):
-    answer = client_of(run_dir).get("run/0/tables/events.parquet", headers={"Range": "bytes=0-3"})
-    assert 206 == answer.status_code
-    assert b"PAR1" == answer.content
 
 
 def test_walls_change_when_a_door_moves(run_dir):
@@ -331,7 +312,7 @@ def test_what_is_no_address_of_a_proxy_is_refused(run_dir):
 def test_no_browser_is_said_with_what_helps(opens, said, monkeypatch):
     monkeypatch.setattr(page_server.webbrowser, "open", lambda _: opens)
     monkeypatch.setattr(PageServer, "run", lambda _: None)
-    lines: list[str] = []
+    lines = []
     server = PageServer([])
     server.show(open_browser=True, announce=lines.append)
     server.close()

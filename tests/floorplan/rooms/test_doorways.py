@@ -22,7 +22,7 @@ ROOMS = [
 ]
 
 
-def flat(*lines: DoorLine) -> FloorPlan:
+def flat(*lines):
     return FloorPlan.build("flat", FREE, ROOMS, doorways=lines)
 
 
@@ -32,25 +32,11 @@ def test_doorway_ends_exactly_at_the_jambs():
     assert doorway.width_m == pytest.approx(0.9)
 
 
-def test_line_drawn_into_the_walls_is_cut_at_them():
-    (doorway,) = flat(DoorLine((2.05, 0.8), (2.05, 2.1))).doorways
-    assert ((2.05, 1.0), (2.05, 1.9)) == (doorway.start, doorway.end)
-
-
 def test_doorway_is_named_after_the_rooms_on_its_left_and_right():
     plan = flat(DoorLine((2.05, 1.0), (2.05, 1.9)))
     assert "kitchen_1-bathroom_1" == plan.doorways[0].name
     assert (plan.room("kitchen_1").index, plan.room("bathroom_1").index) == plan.doorways[0].rooms
     assert plan.doorway("kitchen_1-bathroom_1") is plan.doorways[0]
-
-
-def test_reversed_line_swaps_left_and_right():
-    plan = flat(DoorLine((2.05, 1.9), (2.05, 1.0)))
-    assert "bathroom_1-kitchen_1" == plan.doorways[0].name
-
-
-def test_own_name_stays():
-    assert "hatch" == flat(DoorLine((2.05, 1.0), (2.05, 1.9), name="hatch")).doorways[0].name
 
 
 @pytest.mark.parametrize(
@@ -111,19 +97,12 @@ def test_corner_is_alone_unless_its_wall_moves_over_another(tip, is_alone):
     assert is_alone == was_alone == changed.is_valid
 
 
-def test_stored_plan_has_the_same_doorways():
-    plan = flat(DoorLine((2.05, 1.1), (2.05, 1.8), leaf=False))
-    lines = [DoorLine(d.start, d.end, d.name, d.leaf) for d in plan.doorways]
-    assert plan.doorways == flat(*lines).doorways
-    assert plan == flat(*lines)
-
-
 def test_unknown_doorway_is_refused_with_the_known_ones():
     with pytest.raises(FloorPlanError, match=r"no doorway 'kitchen'.*kitchen_1-bathroom_1"):
         flat(DoorLine((2.05, 1.0), (2.05, 1.9))).doorway("kitchen")
 
 
-def check_fitted(polygons: list[shapely.Polygon], columns: int, rows: int, seed: int) -> int:
+def check_fitted(polygons, columns, rows, seed):
     """Fit random lines; return how many stood from wall to wall."""
     rng = np.random.default_rng(seed)
     lattice = Lattice(0.05, (0.0, 0.0), columns, rows)

@@ -3,14 +3,14 @@
 import numpy as np
 import shapely
 
-from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
+from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.doorways import DoorLine, open_borders
 
 LATTICE = Lattice(0.5, (0.0, 0.0), 6, 6)
 
 
-def rooms(*rows: str) -> np.ndarray:
+def rooms(*rows):
     return np.array([[int(c) if c != "." else -1 for c in row] for row in rows], np.int16)
 
 
@@ -21,11 +21,6 @@ def test_open_border_is_as_long_as_its_longer_side():
 
 def test_single_pair_of_touching_cells_is_no_link():
     assert () == open_borders(LATTICE, rooms("00..", "0011", "...1"), ())
-
-
-def test_border_along_a_passage_is_that_doorway_and_no_open_border():
-    side = 2 * UNITS_PER_CELL
-    assert () == open_borders(LATTICE, rooms("0011", "0011"), [((side, 0), (side, side))])
 
 
 def test_room_graph_has_doorways_first_and_gives_the_neighbors():

@@ -1,5 +1,5 @@
 import math
-from pathlib import Path
+from itertools import pairwise
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
@@ -35,7 +35,7 @@ BED = (
 )
 
 
-def write(folder: Path, *content: str) -> Path:
+def write(folder, *content):
     path = folder / "Home.xml"
     path.write_text(f'<?xml version="1.0"?>\n<home name="flat">{"".join(content)}</home>')
     return path
@@ -54,7 +54,7 @@ def test_rooms_walls_doors_and_furniture_become_a_home(tmp_path):
     assert (6.3, -3.0, 7.7, -1.0) == pytest.approx(plan.objects[0].footprint.bounds)
 
 
-def piece(name: str, height: float, *, elevation: float = 0, angle: float = 0) -> str:
+def piece(name, height, *, elevation=0, angle=0):
     return (
         f'<pieceOfFurniture name="{name}" x="600" y="200" width="200" depth="90"'
         f' height="{height}" elevation="{elevation}" angle="{angle}"/>'
@@ -84,13 +84,6 @@ def test_the_front_of_furniture_is_its_lower_side_turned_clockwise(tmp_path, ang
     plan = load_floorplan(write(tmp_path, WALLS, ROOMS, piece("Sofa", 80, angle=angle)))
 
     assert heading == pytest.approx(plan.objects[0].heading, abs=1e-5)
-
-
-def test_walls_alone_enclose_the_home(tmp_path):
-    plan = load_floorplan(write(tmp_path, WALLS, DOOR))
-
-    assert plan.area_m2 == pytest.approx(2 * 3.9 * 3.9 + 0.1 * 0.9, abs=0.1)
-    assert 2 == len(plan.rooms)
 
 
 def test_level_is_chosen_by_name_and_else_all_lie_side_by_side(tmp_path):
@@ -152,49 +145,59 @@ def test_levels_of_one_name_are_told_apart_by_their_ids():
         choose_storey(levels, "Floor")
 
 
-def house(k: int) -> tuple[str, int]:
+def house(k):
     """A home of one to three storeys, turned, and how many storeys it has."""
     home = small_home(k, turns=(0, 90, 17, 45))
     storeys = 1 + k % 3
     (_, _, x, y), (_, y1, _, top), (x1, _, right, _) = home.rooms
     half = OUTER_M / 2
-    elements = []
 
-    def xy(point: tuple[float, float], names: tuple[str, str] = ("x", "y")) -> str:
+    def xy(point, x_key="x", y_key="y"):
         px, py = home.place(point)
-        return f'{names[0]}="{px * 100:.3f}" {names[1]}="{-py * 100:.3f}"'
+        return f'{x_key}="{px * 100:.3f}" {y_key}="{-py * 100:.3f}"'
 
-    lines = [
-        ((-half, -half), (right + half, -half), OUTER_M),
-        ((right + half, -half), (right + half, top + half), OUTER_M),
-        ((right + half, top + half), (-half, top + half), OUTER_M),
-        ((-half, top + half), (-half, -half), OUTER_M),
-        ((0, (y + y1) / 2), (x, (y + y1) / 2), INNER_M),
-        (((x + x1) / 2, 0), ((x + x1) / 2, top), INNER_M),
+    def wall(start, end, thickness):
+        ends = f"{xy(start, 'xStart', 'yStart')} {xy(end, 'xEnd', 'yEnd')}"
+        return f'<wall {ends} thickness="{thickness * 100}" LEVEL/>'
+
+    def room(box, name):
+        x0, y0, x2, y2 = box
+        corners = ((x0, y0), (x2, y0), (x2, y2), (x0, y2))
+        points = "".join(f"<point {xy(corner)}/>" for corner in corners)
+        return f'<room name="{name}" LEVEL>{points}</room>'
+
+    def door(start, end):
+        angle = (0 if start[1] == end[1] else math.pi / 2) - home.turn
+        middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
+        size = f'width="{math.dist(start, end) * 100:.1f}" depth="12" angle="{angle}"'
+        return f'<doorOrWindow name="Door" {xy(middle)} {size} LEVEL/>'
+
+    corners = [
+        (-half, -half),
+        (right + half, -half),
+        (right + half, top + half),
+        (-half, top + half),
     ]
-    for n in range(storeys):
-        level = f'level="L{n}"' if storeys > 1 else ""
-        elements += [f'<level id="L{n}" name="{n}. OG" elevation="{n * 262}"/>'] if level else []
-        for start, end, thickness in lines:
-            ends = f"{xy(start, ('xStart', 'yStart'))} {xy(end, ('xEnd', 'yEnd'))}"
-            elements.append(f'<wall {ends} thickness="{thickness * 100}" {level}/>')
-        for room, name in zip(home.rooms, home.names, strict=True):
-            x0, y0, x2, y2 = room
-            corners = ((x0, y0), (x2, y0), (x2, y2), (x0, y2))
-            points = "".join(f"<point {xy(corner)}/>" for corner in corners)
-            elements.append(f'<room name="{name}" {level}>{points}</room>')
-        for (ax, ay), (bx, by) in (*home.doors, home.front):
-            angle = (0 if ay == by else math.pi / 2) - home.turn
-            at = xy(((ax + bx) / 2, (ay + by) / 2))
-            width = math.dist((ax, ay), (bx, by)) * 100
-            elements.append(
-                f'<doorOrWindow name="Door" {at} width="{width:.1f}" depth="12"'
-                f' angle="{angle}" {level}/>'
-            )
-        stairs = f'width="100" depth="280" height="262" angle="{-home.turn}" {level}'
-        words = ("Staircase", "Treppe", "Escalier", "Escalera", "Scala")[k % 5]
-        elements.append(f'<pieceOfFurniture name="{words}" {xy((right - 1, 1.8))} {stairs}/>')
-    return f'<?xml version="1.0"?>\n<home name="house">{"".join(elements)}</home>', storeys
+    words = ("Staircase", "Treppe", "Escalier", "Escalera", "Scala")[k % 5]
+    stairs = f'width="100" depth="280" height="262" angle="{-home.turn}" LEVEL'
+    storey = "".join(
+        [
+            *(wall(*ends, OUTER_M) for ends in pairwise([*corners, corners[0]])),
+            wall((0, (y + y1) / 2), (x, (y + y1) / 2), INNER_M),
+            wall(((x + x1) / 2, 0), ((x + x1) / 2, top), INNER_M),
+            *map(room, home.rooms, home.names),
+            *(door(*ends) for ends in (*home.doors, home.front)),
+            f'<pieceOfFurniture name="{words}" {xy((right - 1, 1.8))} {stairs}/>',
+        ]
+    )
+    content = storey.replace("LEVEL", "")
+    if storeys > 1:
+        levels = [
+            f'<level id="L{n}" name="{n}. OG" elevation="{n * 262}"/>' for n in range(storeys)
+        ]
+        copies = [storey.replace("LEVEL", f'level="L{n}"') for n in range(storeys)]
+        content = "".join([*levels, *copies])
+    return f'<?xml version="1.0"?>\n<home name="house">{content}</home>', storeys
 
 
 @pytest.mark.parametrize("k", VARIATIONS)
@@ -214,24 +217,21 @@ def test_houses_of_any_storeys_language_and_turn_are_the_home(tmp_path, k):
     assert (storeys, 1) == (home.space(0.2).parts, home.space(0.2, uses_portals=True).parts)
 
 
-@pytest.mark.parametrize("degrees", [-150, -90, -30, 10, 45, 90, 120, 179, 200, 270])
+@pytest.mark.parametrize("degrees", [-150, -30, 10, 90, 179, 270])
 def test_round_walls_bulge_by_their_arc(tmp_path, degrees):
     """The area changes by the segment of the circle; rooms reach to the wall."""
     angle = math.radians(degrees)
-    sides = [(0, 0, 800, 0), (800, 0, 800, 1400), (800, 1400, 0, 1400), (0, 1400, 0, 0)]
     areas = []
     for arc in (f'arcExtent="{angle}"', ""):
-        walls = [
-            f'<wall xStart="{a}" yStart="{b}" xEnd="{c}" yEnd="{d}" thickness="10"'
-            f" {arc if k == 0 else ''}/>"
-            for k, (a, b, c, d) in enumerate(sides)
-        ]
-        room = (
-            '<room name="Hall"><point x="5" y="5"/><point x="795" y="5"/><point x="795" y="1395"/>'
-        )
-        areas.append(
-            load_floorplan(write(tmp_path, *walls, f'{room}<point x="5" y="1395"/></room>')).area_m2
-        )
+        walls = f"""
+<wall xStart="0" yStart="0" xEnd="800" yEnd="0" thickness="10" {arc}/>
+<wall xStart="800" yStart="0" xEnd="800" yEnd="1400" thickness="10"/>
+<wall xStart="800" yStart="1400" xEnd="0" yEnd="1400" thickness="10"/>
+<wall xStart="0" yStart="1400" xEnd="0" yEnd="0" thickness="10"/>
+<room name="Hall"><point x="5" y="5"/><point x="795" y="5"/><point x="795" y="1395"/>
+<point x="5" y="1395"/></room>
+"""
+        areas.append(load_floorplan(write(tmp_path, walls)).area_m2)
 
     radius = 8 / 2 / abs(math.sin(angle / 2))
     segment = radius**2 / 2 * (angle - math.sin(angle))

@@ -1,10 +1,7 @@
 import copy
 import json
 import math
-from collections.abc import Sequence
 from itertools import combinations
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +12,6 @@ from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.native import native_document, read_native
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.valetudo import (
     Valetudo,
     read_valetudo_charger,
@@ -31,39 +27,13 @@ MAPS = (
 )
 PIXEL_AREA = 0.05**2
 
-# A file with all that the format has; `test_damaged_files.py` damages it.
-SAMPLE: tuple[str, dict[str, Any]] = (
-    "vacuum.json",
-    {
-        "__class": "ValetudoMap",
-        "metaData": {"version": 2},
-        "size": {"x": 600, "y": 400},
-        "pixelSize": 5,
-        "layers": [
-            {
-                "type": "segment",
-                "metaData": {"segmentId": "1", "name": "Kitchen", "area": 3000},
-                "dimensions": {"pixelCount": 600},
-                "compressedPixels": [n for y in range(20) for n in (5, y + 5, 30)],
-            },
-            {"type": "wall", "metaData": {}, "pixels": [6, 6, 7, 6]},
-        ],
-        "entities": [
-            {"type": "charger_location", "points": [60, 60]},
-            {"type": "path", "points": [60, 60, 90, 90]},
-            {"type": "no_go_area", "points": [50, 50, 80, 50, 80, 80, 50, 80]},
-            {"type": "virtual_wall", "points": [50, 90, 90, 90]},
-        ],
-    },
-)
 
-
-def runs(x0: int, y0: int, x1: int, y1: int) -> list[int]:
+def runs(x0, y0, x1, y1):
     """A box of pixels, the last row and column not in it, as Valetudo writes it."""
     return [number for y in range(y0, y1) for number in (x0, y, x1 - x0)]
 
 
-def layer(kind: str, pixels: Sequence[object], **meta: Any) -> dict[str, Any]:
+def layer(kind, pixels, **meta):
     return {
         "__class": "MapLayer",
         "type": kind,
@@ -72,7 +42,7 @@ def layer(kind: str, pixels: Sequence[object], **meta: Any) -> dict[str, Any]:
     }
 
 
-def entity(kind: str, *points: float) -> dict[str, Any]:
+def entity(kind, *points):
     return {"__class": "Entity", "type": kind, "metaData": {}, "points": list(points)}
 
 
@@ -81,7 +51,7 @@ ROOM_17 = layer("segment", runs(50, 10, 70, 40), segmentId="17")
 FLOOR = layer("floor", runs(10, 40, 30, 50))
 
 
-def vacuum_map(*layers: dict[str, Any], **changes: Any) -> dict[str, Any]:
+def vacuum_map(*layers, **changes):
     return {
         "__class": "ValetudoMap",
         "metaData": {"version": 2},
@@ -93,23 +63,42 @@ def vacuum_map(*layers: dict[str, Any], **changes: Any) -> dict[str, Any]:
     }
 
 
-def read_valetudo(path: Path, cell: float | None = None, **settings: Any) -> FloorPlan:
+# A file with all that the format has; `test_damaged_files.py` damages it.
+SAMPLE = (
+    "vacuum.json",
+    vacuum_map(
+        {
+            **layer("segment", runs(5, 5, 35, 25), segmentId="1", name="Kitchen", area=3000),
+            "dimensions": {"pixelCount": 600},
+        },
+        {"type": "wall", "metaData": {}, "pixels": [6, 6, 7, 6]},
+        entities=[
+            entity("charger_location", 60, 60),
+            entity("path", 60, 60, 90, 90),
+            entity("no_go_area", 50, 50, 80, 50, 80, 80, 50, 80),
+            entity("virtual_wall", 50, 90, 90, 90),
+        ],
+    ),
+)
+
+
+def read_valetudo(path, cell=None, **settings):
     """Read a map without cleaning, except where the settings ask for it."""
     plain = {"bridge_pixels": 0, "scrap_area_m2": 0.0, "borders": "exact"}
     return Valetudo.model_construct(path=path, cell=cell, **(plain | settings)).load()
 
 
-def write(folder: Path, content: object) -> Path:
+def write(folder, content):
     path = folder / "home.json"
     path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
     return path
 
 
-def home(folder: Path, *layers: dict[str, Any], **changes: Any) -> FloorPlan:
+def home(folder, *layers, **changes):
     return read_valetudo(write(folder, vacuum_map(*layers, **changes)))
 
 
-def refusal(folder: Path, content: object) -> str:
+def refusal(folder, content):
     path = write(folder, content)
     with pytest.raises(FloorPlanError) as caught:
         read_valetudo(path)
@@ -117,7 +106,7 @@ def refusal(folder: Path, content: object) -> str:
     return str(caught.value)
 
 
-def assert_box(expected: tuple[float, float, float, float], plan: FloorPlan) -> None:
+def assert_box(expected, plan):
     assert pytest.approx(expected) == plan.bounds
     assert shapely.box(*expected).symmetric_difference(plan.free_space).area < 1e-9
 
@@ -125,9 +114,9 @@ def assert_box(expected: tuple[float, float, float, float], plan: FloorPlan) -> 
 # --- The real maps ------------------------------------------------------------------------------
 
 
-def pixels_of(content: dict[str, Any], *kinds: str) -> set[tuple[int, int]]:
+def pixels_of(content, *kinds):
     """The pixels (x, y) of all layers of some kinds, decoded one by one."""
-    pixels: set[tuple[int, int]] = set()
+    pixels = set()
     for item in content["layers"]:
         if item["type"] not in kinds:
             continue
@@ -139,38 +128,23 @@ def pixels_of(content: dict[str, Any], *kinds: str) -> set[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_real_map_has_exactly_the_pixels_of_the_file_and_rooms_that_cover_them(shared_data, name):
+def test_real_map_has_the_pixels_of_the_file_and_its_segments_as_rooms(shared_data, name):
     path = shared_data / "valetudo" / f"{name}.json"
     content = json.loads(path.read_text())
-    floor = pixels_of(content, "floor", "segment") - pixels_of(content, "wall")
+    segments = [item for item in content["layers"] if item["type"] == "segment"]
+    wall = pixels_of(content, "wall")
+    floor = pixels_of(content, "floor", "segment") - wall
 
     plan = read_valetudo(path, no_go="ignore")
 
     rows, columns = np.nonzero(plan.free)
     x0, y0 = (round(v / 0.05) for v in plan.lattice.origin)
-    cells = {(x0 + int(c), -1 - (y0 + int(r))) for r, c in zip(rows, columns, strict=True)}
-    assert floor == cells
-    assert pytest.approx(len(floor) * PIXEL_AREA) == plan.area_m2
+    assert floor == set(zip((x0 + columns).tolist(), (-1 - y0 - rows).tolist(), strict=True))
     assert np.array_equal(plan.free, plan.room_of_cell >= 0)
-    assert len(floor) == sum(room.cells for room in plan.rooms)
-    assert name == plan.name
-    assert plan.entrance is None
-
-
-@pytest.mark.parametrize("name", MAPS)
-def test_real_segments_are_rooms_of_the_area_that_the_file_states(shared_data, name):
-    path = shared_data / "valetudo" / f"{name}.json"
-    content = json.loads(path.read_text())
-    segments = [item for item in content["layers"] if item["type"] == "segment"]
-    wall = pixels_of(content, "wall")
-
-    plan = read_valetudo(path, no_go="ignore")
-
     names = [s["metaData"].get("name") or f"segment_{s['metaData']['segmentId']}" for s in segments]
-    assert names == [room.name for room in plan.rooms][: len(names)]
     if segments:
-        rest = ["unknown_1"] * ("floor" in {item["type"] for item in content["layers"]})
-        assert rest == [room.name for room in plan.rooms[len(names) :]]
+        names += ["unknown_1"] * ("floor" in {item["type"] for item in content["layers"]})
+        assert names == [room.name for room in plan.rooms]
     else:  # rooms are found then
         assert {"room"} == {room.type for room in plan.rooms}
     for segment, room in zip(segments, plan.rooms, strict=False):
@@ -181,19 +155,28 @@ def test_real_segments_are_rooms_of_the_area_that_the_file_states(shared_data, n
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_real_path_runs_on_the_floor_of_the_plan(shared_data, name):
+def test_real_path_runs_on_the_floor_of_the_plan_and_the_charger_has_a_place_before_it(
+    shared_data, name
+):
     """Entities and pixels share a frame: a mirrored or shifted path would leave the floor."""
     path = shared_data / "valetudo" / f"{name}.json"
     plan = read_valetudo(path)
-    charger = read_valetudo_charger(path)
 
     way = read_valetudo_path(path)
 
     recorded = [e for e in json.loads(path.read_text())["entities"] if e["type"] == "path"]
     assert (sum(len(e["points"]) for e in recorded) // 2, 2) == way.shape
     assert all(plan.room_at(x, y) is not None for x, y in way.tolist())
-    assert charger is not None
-    assert np.hypot(*np.subtract(charger, plan.nearest_free(*charger))) < 0.35
+    (charger,) = plan.objects
+    (place,) = charger.uses
+    at = charger.footprint.centroid
+    assert ("charger", "charger", "nothing") == (charger.name, charger.type, charger.blocks)
+    assert read_valetudo_charger(path) == pytest.approx((at.x, at.y))
+    assert plan.free_space.contains(shapely.Point(place.x, place.y).buffer(0.17))
+    assert math.hypot(at.x - place.x, at.y - place.y) < 0.6
+    assert math.atan2(at.y - place.y, at.x - place.x) == pytest.approx(
+        math.remainder(place.heading, math.tau), abs=1e-5
+    )
 
 
 def test_real_map_with_german_names_has_rooms_of_known_types(shared_data):
@@ -212,36 +195,6 @@ def test_real_map_with_german_names_has_rooms_of_known_types(shared_data):
     assert expected == {room.name: room.type for room in plan.rooms}
 
 
-def test_real_no_go_area_is_an_area_and_no_wall(shared_data):
-    path = shared_data / "valetudo" / "roborock_s6_segments.json"
-
-    plan, open_plan = read_valetudo(path), read_valetudo(path, no_go="ignore")
-
-    (area,) = plan.no_go
-    assert pytest.approx((25.0, -24.1, 27.2, -23.2), abs=0.1) == area.bounds
-    assert () == open_plan.no_go
-    assert np.array_equal(plan.room_of_cell, open_plan.room_of_cell)
-
-
-def test_real_no_go_area_can_be_a_wall(shared_data):
-    path = shared_data / "valetudo" / "roborock_s6_segments.json"
-    area = shapely.box(25.0, -24.1, 27.2, -23.2)
-
-    open_plan, plan = read_valetudo(path, no_go="ignore"), read_valetudo(path, no_go="wall")
-
-    lost = open_plan.free_space.intersection(area).area
-    assert lost > 1.5
-    assert pytest.approx(lost) == open_plan.area_m2 - plan.area_m2
-    assert plan.free_space.intersection(area).area < 1e-9
-
-
-@pytest.mark.parametrize("name", MAPS)
-def test_real_map_comes_back_from_our_own_format(shared_data, tmp_path, name):
-    plan = read_valetudo(shared_data / "valetudo" / f"{name}.json")
-
-    assert plan == read_native(write(tmp_path, native_document(plan)))
-
-
 # --- Free space ---------------------------------------------------------------------------------
 
 
@@ -250,20 +203,6 @@ def test_pixels_become_metres_with_y_upwards(tmp_path):
     plan = home(tmp_path, layer("floor", runs(10, 20, 30, 24)))
 
     assert_box((0.5, -1.2, 1.5, -1.0), plan)
-
-
-def test_upper_rows_of_the_file_have_the_higher_y(tmp_path):
-    plan = home(tmp_path, KITCHEN, FLOOR)
-
-    kitchen, floor = plan.room("Kitchen"), plan.room("unknown_1")
-    assert kitchen.anchor_xy[1] > floor.anchor_xy[1]
-
-
-def test_raw_pixels_and_runs_are_the_same(tmp_path):
-    raw = layer("segment", [], segmentId="3", name="Kitchen")
-    raw["pixels"] = [n for y in range(10, 40) for x in range(10, 50) for n in (x, y)]
-
-    assert home(tmp_path, KITCHEN) == home(tmp_path, raw)
 
 
 def test_overlapping_runs_count_once(tmp_path):
@@ -287,18 +226,6 @@ def test_pixels_that_share_a_corner_are_not_joined(tmp_path):
     assert pytest.approx(200 * PIXEL_AREA) == plan.area_m2
 
 
-def test_room_inside_a_ring_of_wall_is_apart(tmp_path):
-    """An outline in the hole of another one."""
-    inner = runs(20, 20, 30, 30)
-    outer = [*runs(10, 10, 40, 15), *runs(10, 35, 40, 40), *runs(10, 15, 15, 35)]
-    outer += runs(35, 15, 40, 35)
-
-    plan = home(tmp_path, layer("floor", [*outer, *inner]))
-
-    assert pytest.approx((900 - 400 + 100) * PIXEL_AREA) == plan.area_m2
-    assert [0, 1] == sorted(len(polygon.interiors) for polygon in plan.polygons)
-
-
 # --- Rooms --------------------------------------------------------------------------------------
 
 
@@ -315,13 +242,12 @@ def test_segments_are_rooms_and_other_floor_is_unknown(tmp_path):
 
 def test_segments_of_one_name_get_names_of_their_own(tmp_path):
     boxes = [runs(10 * k, 0, 10 * k + 10, 10) for k in range(1, 5)]
-    names = ["Bedroom", "Bedroom", "Bedroom 2", "Bedroom"]
+    names = ["Bedroom", "Bedroom", "Bedroom 2", "Ku\u0308che"]
 
     plan = home(tmp_path, *(layer("segment", b, name=n) for b, n in zip(boxes, names, strict=True)))
 
-    expected = ["Bedroom", "Bedroom 3", "Bedroom 2", "Bedroom 4"]
-    assert expected == [room.name for room in plan.rooms]
-    assert {"bedroom"} == {room.type for room in plan.rooms}
+    assert ["Bedroom", "Bedroom 3", "Bedroom 2", "Küche"] == [room.name for room in plan.rooms]
+    assert ["bedroom", "bedroom", "bedroom", "kitchen"] == [room.type for room in plan.rooms]
     assert any("several segments are called Bedroom" in note for note in plan.notes)
 
 
@@ -334,24 +260,7 @@ def test_pixels_of_two_segments_belong_to_the_smaller(tmp_path):
     assert any("50 pixels are in several segments" in note for note in plan.notes)
 
 
-@pytest.mark.parametrize("name", ["", "   ", None, 7])
-def test_segment_without_a_proper_name_is_called_by_its_id(tmp_path, name):
-    plan = home(tmp_path, layer("segment", runs(0, 0, 20, 20), segmentId="5", name=name))
-
-    assert [("segment_5", "unknown")] == [(room.name, room.type) for room in plan.rooms]
-
-
-def test_umlaut_written_as_two_characters_is_the_same_name(tmp_path):
-    plan = home(tmp_path, layer("segment", runs(0, 0, 20, 20), name="Ku\u0308che"))
-
-    assert [("Küche", "kitchen")] == [(room.name, room.type) for room in plan.rooms]
-
-
 # --- No-go areas and virtual walls ----------------------------------------------------------------
-
-
-def home_with_walls(folder: Path, *entities: dict[str, Any]) -> FloorPlan:
-    return read_valetudo(write(folder, vacuum_map(KITCHEN, entities=list(entities))), no_go="wall")
 
 
 def test_no_go_areas_and_virtual_walls_are_areas_of_the_plan(tmp_path):
@@ -372,7 +281,7 @@ def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path):
     """From 101 to 114 cm are the pixels 20 to 22, down to 150 cm the row 29."""
     area = entity("no_go_area", 101, 100, 114, 100, 114, 150, 101, 150)
 
-    plan = home_with_walls(tmp_path, area)
+    plan = read_valetudo(write(tmp_path, vacuum_map(KITCHEN, entities=[area])), no_go="wall")
 
     (hole,) = (shapely.Polygon(hole) for hole in plan.free_space.geoms[0].interiors)
     assert pytest.approx((1.0, -1.5, 1.15, -1.0)) == hole.bounds
@@ -381,35 +290,21 @@ def test_no_go_area_takes_every_pixel_that_it_touches_as_a_wall(tmp_path):
 
 @pytest.mark.parametrize("y", [100, 102])
 def test_virtual_wall_parts_a_room(tmp_path, y):
-    wall = entity("virtual_wall", 50, y, 250, y + 31)
+    path = write(
+        tmp_path, vacuum_map(KITCHEN, entities=[entity("virtual_wall", 50, y, 250, y + 31)])
+    )
 
-    plan = home_with_walls(tmp_path, wall)
+    plan = read_valetudo(path, no_go="wall")
 
+    assert ("virtual walls in the map: 1, ignored",) == read_valetudo(path, no_go="ignore").notes
     assert 2 == len(plan.polygons)
     assert plan.area_m2 > 1140 * PIXEL_AREA - 0.2
-
-
-def test_no_go_areas_can_be_ignored(tmp_path):
-    entities = [
-        entity("no_go_area", 60, 60, 200, 60, 200, 150, 60, 150),
-        entity("virtual_wall", 50, 100, 250, 100),
-    ]
-    path = write(tmp_path, vacuum_map(KITCHEN, entities=entities))
-
-    plan = read_valetudo(path, no_go="ignore")
-
-    assert_box((0.5, -2.0, 2.5, -0.5), plan)
-    assert {"no-go areas in the map: 1, ignored", "virtual walls in the map: 1, ignored"} <= set(
-        plan.notes
-    )
 
 
 @pytest.mark.parametrize(
     "bad",
     [
-        entity("no_go_area", 60, 60, 200, 60),
         entity("no_go_area", 60, 60, 200, 60, 130, 60),
-        entity("virtual_wall", 60, 60),
         entity("virtual_wall", 60, 60, 60, 60),
         entity("virtual_wall"),
     ],
@@ -464,43 +359,19 @@ def test_path_and_charger_are_in_the_frame_of_the_plan(tmp_path):
     assert "also in the map, without effect on the plan: predicted_path (1)" in plan.notes
 
 
-@pytest.mark.parametrize("name", MAPS)
-def test_real_charger_is_an_object_with_a_place_to_stand_in_front_of_it(shared_data, name):
-    plan = read_valetudo(shared_data / "valetudo" / f"{name}.json")
+def test_map_without_path_and_with_a_charger_far_from_all_floor_is_read(tmp_path):
+    path = write(tmp_path, vacuum_map(entities=[entity("charger_location", 5000, 5000)]))
 
-    (charger,) = plan.objects
-
-    (place,) = charger.uses
-    at = charger.footprint.centroid
-    assert ("charger", "charger", "nothing") == (charger.name, charger.type, charger.blocks)
-    assert read_valetudo_charger(shared_data / "valetudo" / f"{name}.json") == pytest.approx(
-        (at.x, at.y)
-    )
-    assert plan.free_space.contains(shapely.Point(place.x, place.y).buffer(0.17))
-    to_x, to_y = at.x - place.x, at.y - place.y
-    assert math.hypot(to_x, to_y) < 0.6
-    assert (math.cos(place.heading), math.sin(place.heading)) == pytest.approx(
-        (to_x / math.hypot(to_x, to_y), to_y / math.hypot(to_x, to_y)), abs=1e-5
-    )
-
-
-def test_charger_far_from_all_floor_has_no_place_to_stand(tmp_path):
-    plan = home(tmp_path, entities=[entity("charger_location", 5000, 5000)])
-
-    assert [()] == [thing.uses for thing in plan.objects]
-    assert plan == read_native(write(tmp_path, native_document(plan)))
-
-
-def test_map_without_path_and_charger_says_so(tmp_path):
-    path = write(tmp_path, vacuum_map())
+    plan = read_valetudo(path)
 
     assert (0, 2) == read_valetudo_path(path).shape
     assert [] == read_valetudo_paths(path)
-    assert () == read_valetudo(path).objects
-    assert read_valetudo_charger(path) is None
+    assert [()] == [thing.uses for thing in plan.objects]
+    assert plan == read_native(write(tmp_path, native_document(plan)))
+    assert read_valetudo_charger(write(tmp_path, vacuum_map())) is None
 
 
-@pytest.mark.parametrize("points", [None, [1], [1, "2"], [1, True], [1, float("nan")], [1, 1e99]])
+@pytest.mark.parametrize("points", [None, [1], [1, "2"], [1, float("nan")], [1, 1e99]])
 @pytest.mark.parametrize("read", [read_valetudo_path, read_valetudo, read_valetudo_paths])
 def test_damaged_path_is_refused(tmp_path, read, points):
     bad = {"type": "path", "points": points}
@@ -513,35 +384,19 @@ def test_damaged_path_is_refused(tmp_path, read, points):
 # --- As a component, and found by its content -------------------------------------------------------
 
 
-def test_component_takes_the_cell_from_the_map(tmp_path):
+def test_component_takes_the_cell_from_the_map_unless_it_is_set(tmp_path):
     path = write(tmp_path, vacuum_map(pixelSize=4))
 
     source = Valetudo(path=path)
 
     assert lookup("floorplan", "valetudo") is Valetudo
-    assert 0.04 == source.cell
-    assert 0.04 == source.load().lattice.cell
+    assert 0.04 == source.cell == source.load().lattice.cell
     assert source.load() == load_floorplan(path)
-
-
-def test_cell_setting_is_used(tmp_path):
-    path = write(tmp_path, vacuum_map())
-
     for plan in (Valetudo(path=path, cell=0.1).load(), load_floorplan(path, 0.1)):
         assert 0.1 == plan.lattice.cell
-        assert pytest.approx(2000 * PIXEL_AREA) == plan.area_m2
-
-
-def test_component_refuses_an_unknown_choice(tmp_path):
+        assert pytest.approx(2000 * 0.04**2) == plan.area_m2
     with pytest.raises(ValidationError, match="keep_out"):
-        Valetudo(path=write(tmp_path, vacuum_map()), no_go="maybe")
-
-
-def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path):
-    source = Valetudo(path=write(tmp_path, "{"))
-
-    with pytest.raises(FloorPlanError, match="is not JSON"):
-        source.load()
+        Valetudo(path=path, no_go="maybe")
 
 
 # --- Odd and damaged files --------------------------------------------------------------------------
@@ -554,19 +409,14 @@ def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path):
         ({"metaData": {"version": 3}}, "version 3 of Valetudo's map format"),
         ({"metaData": None}, "version null"),
         ({"pixelSize": None}, "pixelSize is null"),
-        ({"pixelSize": 0}, "pixelSize is 0"),
         ({"pixelSize": 0.05}, "1 to 100 cm"),
-        ({"pixelSize": -5}, "pixelSize is -5"),
         ({"pixelSize": float("nan")}, "pixelSize is NaN"),
         ({"pixelSize": 10**400}, "pixelSize is a whole number of 1329 bits"),
         ({"size": {"x": 10**400, "y": 5}}, "size is"),
-        ({"size": {"x": -1, "y": 5}}, "size is"),
         ({"size": [1, 2]}, "size is"),
         ({"layers": {}}, "layers is {}: a list"),
         ({"layers": [3]}, "layers[0] is 3"),
-        ({"layers": []}, "no floor"),
         ({"layers": [layer("floor", [])]}, "no floor"),
-        ({"layers": [layer("wall", runs(0, 0, 9, 9))]}, "no floor"),
         ({"layers": [FLOOR, layer("wall", runs(0, 0, 99, 99))]}, "no floor is left"),
         ({"layers": [layer("floor", [0, 0, 9, 0])]}, "cut off"),
         ({"layers": [{"type": "floor", "pixels": [1, 2, 3]}]}, "cut off"),
@@ -576,9 +426,7 @@ def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path):
             "layers[0].compressedPixels[2] is 1099511627776: 1048576 or less",
         ),
         ({"layers": [layer("floor", [0, 0, 1.5])]}, "[2] is 1.5: a whole number"),
-        ({"layers": [layer("floor", [0, 0, True])]}, "[2] is true: a whole number"),
         ({"layers": [layer("floor", ["0", 0, 4])]}, 'compressedPixels[0] is "0": a whole number'),
-        ({"layers": [{"type": "floor", "compressedPixels": "0 0 4"}]}, "a list is expected"),
         ({"layers": [layer("floor", [0, 0, 9, 10**6, 10**6, 9])]}, "spread over"),
         ({"layers": [layer("floor", [0, 0, 20_000])]}, "too large"),
         ({"entities": 5}, "entities is 5"),
@@ -586,6 +434,12 @@ def test_component_of_a_damaged_file_says_so_when_it_loads(tmp_path):
 )
 def test_damaged_map_is_refused(tmp_path, changes, message):
     assert message in refusal(tmp_path, vacuum_map(**changes))
+
+
+def test_pixels_beyond_the_stated_size_are_noted(tmp_path):
+    for box in ((-5, 0, 20, 20), (100, 0, 130, 9), (0, 9, 9, 90)):
+        plan = home(tmp_path, layer("floor", runs(*box)))
+        assert any("reach beyond its size of 600 x 400 cm" in note for note in plan.notes)
 
 
 def test_noise_is_refused_quickly(tmp_path):
@@ -596,26 +450,15 @@ def test_noise_is_refused_quickly(tmp_path):
 
 def test_odd_layers_are_noted(tmp_path):
     short = {**KITCHEN, "dimensions": {"pixelCount": 1300}}
-    empty = layer("segment", [], segmentId="9")
+    empty = layer("segment", [], segmentId="9", name="  ")
 
-    plan = home(tmp_path, short, empty, layer("carpet", [1, 2, 3]))
+    plan = home(tmp_path, short, empty, layer("carpet", [1, 2, 3]), size=None)
 
     assert (
         "the segment Kitchen has 1200 pixels, though its pixelCount says 1300",
         "the segment segment_9 has no pixels: ignored",
         'layers[2] is of the unknown type "carpet": ignored',
     ) == plan.notes
-
-
-@pytest.mark.parametrize("box", [(-5, 0, 20, 20), (0, -1, 20, 20), (100, 0, 130, 9), (0, 9, 9, 90)])
-def test_pixels_beyond_the_stated_size_are_noted(tmp_path, box):
-    plan = home(tmp_path, layer("floor", runs(*box)))
-
-    assert any("reach beyond its size of 600 x 400 cm" in note for note in plan.notes)
-
-
-def test_map_without_a_stated_size_is_read(tmp_path):
-    assert () == home(tmp_path, KITCHEN, size=None).notes
 
 
 # --- Cleaning -----------------------------------------------------------------------------------
@@ -626,13 +469,13 @@ RIGHT = layer("segment", runs(42, 0, 82, 30), segmentId="2", name="Office")
 SCRAP = layer("floor", runs(100, 0, 110, 10))
 
 
-def cleaned(folder: Path, *layers: dict[str, Any], **settings: Any) -> FloorPlan:
+def cleaned(folder, *layers, **settings):
     changes = {"entities": settings.pop("entities", [])}
     source = Valetudo(path=write(folder, vacuum_map(*layers, **changes)), **settings)
     return source.load()
 
 
-def wall_with_gap(low: int, high: int) -> dict[str, Any]:
+def wall_with_gap(low, high):
     """The wall between the rooms, without the pixels from row `low` to `high`."""
     return layer("wall", [*runs(40, 0, 42, low), *runs(40, high, 42, 30)])
 
@@ -695,9 +538,6 @@ def test_narrow_border_of_segments_is_a_doorway(tmp_path):
     }
     assert all(door.width_m == pytest.approx(1.0) for door in plan.doorways)
     assert len(plain.doorways) < 2
-    copy = tmp_path / "copy.json"
-    copy.write_text(json.dumps(native_document(plan)))
-    assert read_native(copy) == plan
 
 
 @pytest.mark.parametrize(

@@ -7,18 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import shapely
 from tests.thorough import some
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.synthetic.generator import (
     MAX_CORRIDOR_SHARE,
-    House,
     generate,
-    outline_corners,
-    outline_kind,
 )
 from fleet2d.homes.synthetic.program import SIZES, Style, Wishes
 from fleet2d.homes.synthetic.slicing import Box, boxes_overlap, inner_walls
@@ -38,26 +32,18 @@ PRIVATE = {"bedroom", "bathroom", "toilet", "wardrobe"}
 
 
 @cache
-def home(seed: int, **settings: object) -> FloorPlan:
+def home(seed, **settings):
     return Synthetic(seed=seed, **settings).load()
 
 
-def reachable_rooms(plan: FloorPlan) -> set[int]:
-    links = [door.rooms for door in plan.doorways]
-    reached = {plan.room_at(*plan.entrance).index}
-    for _ in plan.rooms:
-        reached |= {a for pair in links for a in pair if reached & set(pair)}
-    return reached
-
-
-def content(house: House) -> str:
+def content(house):
     """The digest of the content of a floor plan, independent of how plans are stored."""
     gaps = [(*gap.wall, gap.low, gap.high, gap.leaf) for gap in (*house.gaps, house.front_door)]
     kinds = [brief.kind for brief in house.briefs]
     return hashlib.sha256(json.dumps([kinds, house.boxes, gaps]).encode()).hexdigest()[:16]
 
 
-def house_of(seed: int) -> House:
+def house_of(seed):
     return generate(seed, Wishes(), Style())
 
 
@@ -65,20 +51,6 @@ def test_seed_whose_first_areas_fit_into_no_layout_gets_another_area():
     # 480 layouts of 386, 292, 394 and 277 m2 were drawn in vain for it: the data set that trains
     # the model `learned` has this home, and couldn't be made.
     assert Synthetic(seed=1022).load().rooms_of_type("bedroom")
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_home_is_in_one_part_for_a_body_and_every_room_can_be_reached_by_doorways(seed):
-    plan = home(seed)
-    assert () == plan.notes
-    assert 1 == len(plan.polygons)
-    assert set(range(len(plan.rooms))) == reachable_rooms(plan)
-    # Free space that a disc of 0.25 m can be in stays in one part, with a piece in every room.
-    scale = plan.lattice.units_per_m
-    space = shapely.buffer(plan.polygons[0], -0.25 * scale, join_style="mitre")
-    assert "Polygon" == space.geom_type
-    for room in plan.rooms:
-        assert shapely.intersects_xy(space, *plan.lattice.to_lattice(room.anchor_xy)), room.name
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -90,11 +62,6 @@ def test_doorways_are_as_wide_as_a_body_needs_and_lead_where_they_should(seed):
     assert front.rooms[0] == front.rooms[1] == plan.room_at(*plan.entrance).index
     inner = [door for door in plan.doorways if door is not front]
     assert all(door.rooms[0] != door.rooms[1] for door in inner)
-    # No route leads through a bathroom or a bedroom, except to a room that belongs to it.
-    for room in (room for room in plan.rooms if room.type in PRIVATE):
-        doors = [door for door in inner if room.index in door.rooms]
-        others = {plan.rooms[sum(d.rooms) - room.index].type for d in doors}
-        assert 1 == len(doors) or (room.type == "bedroom" and len(others - PRIVATE) <= 1)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -118,11 +85,6 @@ def test_rooms_are_of_sensible_shapes_and_the_kitchen_is_by_where_people_eat(see
     assert max(baths) < plan.room("living_room_1").area_m2
 
 
-def test_no_two_homes_are_alike():
-    digests = {home(seed).named("home").digest for seed in SEEDS}
-    assert len(SEEDS) == len(digests)
-
-
 @pytest.mark.parametrize("seed", DIGESTS)
 def test_seed_gives_the_home_that_it_gives_on_every_machine(seed):
     assert DIGESTS[seed] == content(house_of(seed))
@@ -139,13 +101,6 @@ def test_area_and_rooms_are_as_requested(area, bedrooms, bathrooms):
         assert area == pytest.approx(plan.area_m2, rel=0.05)
         assert (bedrooms, bathrooms) == (types.count("bedroom"), types.count("bathroom"))
         assert {"living_room", "kitchen"} <= {label for room in plan.rooms for label in room.labels}
-
-
-@pytest.mark.parametrize("outline", ["rectangle", "L", "T", "U"])
-def test_outline_is_the_requested_one(outline):
-    for seed in range(6):
-        house = generate(seed, Wishes(area_m2=140, bedrooms=3), Style(outline=outline))
-        assert outline == outline_kind(outline_corners(house.boxes))
 
 
 def test_widths_and_open_plan_are_as_requested():
@@ -165,22 +120,6 @@ def test_widths_and_open_plan_are_as_requested():
     assert {28} == {min(box.clear) for box in halls}
 
 
-def test_other_settings_leave_the_home_of_a_seed_as_it_is_where_they_agree_with_it():
-    assert home(3).digest == home(3, area_m2=None).digest
-    assert home(3).digest != home(4).digest
-    assert home(0).digest == Synthetic().load().digest
-
-
-def test_body_walks_from_the_front_door_to_every_room():
-    for seed in range(4):
-        plan = home(seed)
-        space = Home(plan).space(0.25)
-        start = plan.lattice.to_lattice(plan.entrance).tolist()
-        for room in plan.rooms:
-            goal = plan.lattice.to_lattice(room.anchor_xy).tolist()
-            assert space.part_at(*start) == space.part_at(*goal) >= 0
-
-
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
@@ -197,24 +136,19 @@ def test_contradiction_is_refused_with_what_would_fit(settings, words):
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [{"area_m2": 10}, {"bedrooms": 0}, {"door_width": 3}, {"corridor_width": 0.2}, {"seed": -1}],
-)
-def test_setting_out_of_range_is_refused(settings):
-    with pytest.raises(ValueError, match=next(iter(settings))):
-        Synthetic(**settings)
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "message"),
+    ("settings", "message"),
     [
-        ("corridor_width", "300 cm", "expected a width of 0.9 m to 2 m, got 3"),
-        ("door_width", 0.1, "expected a width of 0.7 m to 1.2 m, got 0.1"),
+        ({"area_m2": 10}, "area_m2"),
+        ({"area_m2": 17}, "area_m2"),
+        ({"bedrooms": 0}, "bedrooms"),
+        ({"seed": -1}, "seed"),
+        ({"corridor_width": "300 cm"}, "corridor_width\n *expected a width of 0.9 m to 2 m, got 3"),
+        ({"door_width": 0.1}, "door_width\n *expected a width of 0.7 m to 1.2 m, got 0.1"),
     ],
 )
-def test_width_out_of_range_is_refused_with_both_limits_and_the_unit(key, value, message):
-    with pytest.raises(ValueError, match=rf"{key}\n *{message}"):
-        Synthetic(**{key: value})
+def test_setting_out_of_range_is_refused_with_its_limits(settings, message):
+    with pytest.raises(ValueError, match=message):
+        Synthetic(**settings)
 
 
 def test_walls_between_boxes_are_where_they_touch():

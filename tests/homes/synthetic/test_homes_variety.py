@@ -9,18 +9,17 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.furnish import furnish
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.synthetic.source import Synthetic
 
 SEEDS = some(range(200), 10)
 
 
 @cache
-def home(seed: int, **settings: object) -> FloorPlan:
+def home(seed, **settings):
     return Synthetic(seed=seed, **settings).load()
 
 
-def room_graph(plan: FloorPlan) -> object:
+def room_graph(plan):
     """Return the types of the rooms, and the pairs of types that are linked."""
     kinds = [room.type for room in plan.rooms]
     links = [tuple(sorted(kinds[k] for k in link.rooms)) for link in plan.room_graph]
@@ -35,10 +34,6 @@ def test_small_flats_of_one_size_differ_in_rooms_and_links():
     assert len(usual) <= 4
     assert len({room_graph(plan) for plan in varied}) >= 11
     assert all(40 <= plan.area_m2 <= 60 for plan in varied)
-
-
-def test_no_variety_is_the_same_home_as_without_the_key():
-    assert Synthetic(seed=5, area_m2=50).load() == Synthetic(seed=5, area_m2=50, variety=0).load()
 
 
 @pytest.mark.slow
@@ -69,8 +64,6 @@ def test_studio_with_a_bedroom_or_another_outline_is_refused():
         Synthetic(area_m2=20, bedrooms=1).load()
     with pytest.raises(FloorPlanError, match=r"another floorplan\.outline"):
         Synthetic(area_m2=20, outline="U").load()
-    with pytest.raises(ValueError, match="area_m2"):
-        Synthetic(area_m2=17)
 
 
 def test_people_sleep_in_the_living_room_of_a_furnished_studio():
@@ -142,6 +135,6 @@ def test_rooms_are_not_all_rectangles_and_many_homes_have_no_corridor():
     assert 0.2 < len(without) / len(plans) < 0.9
 
 
-def area_of(bounds: tuple[float, float, float, float]) -> float:
+def area_of(bounds):
     x0, y0, x1, y1 = bounds
     return (x1 - x0) * (y1 - y0)

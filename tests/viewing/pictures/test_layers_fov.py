@@ -8,7 +8,6 @@ from tests.scenes import flat_path
 
 import fleet2d
 from fleet2d.errors import InputError, PlacementError
-from fleet2d.kernels import Reach
 from fleet2d.sight.cached_fov import Flashlight
 from fleet2d.viewing.pictures.layers import (
     CameraPose,
@@ -38,10 +37,6 @@ def test_other_pose_is_an_error_that_says_how_it_is_written(text):
         parse_pose(text)
 
 
-def test_reach_is_in_lattice_units(plan):
-    assert Reach(0, (2 * 1280) ** 2, 1024) == CameraPose(1, 2, 0, 2.0, 90.0).reach(plan)
-
-
 def test_both_panels_show_what_is_in_view_and_only_that(plan):
     pose, inside, behind = CameraPose(2.5, 2.5, 0.0, 6.0, 90.0), (4.5, 3.0), (1.0, 2.5)
     hidden = (7.0, 0.5)  # the wall with the door is in the way
@@ -62,15 +57,6 @@ def test_both_panels_show_what_is_in_view_and_only_that(plan):
     for panel_colors in colors[1:]:
         assert colors[0][0] != panel_colors[0]
         assert colors[0][1:] == panel_colors[1:]
-
-
-@pytest.mark.slow
-def test_pictures_are_written_the_same_twice(plan, tmp_path):
-    for ending in (".png", ".svg"):
-        files = [tmp_path / f"{n}{ending}" for n in "ab"]
-        for file in files:
-            draw_fov(plan, CameraPose(2.5, 2.5, 30.0), file)
-        assert files[0].read_bytes() == files[1].read_bytes()
 
 
 def test_pose_in_a_wall_or_a_wrong_ending_writes_nothing(plan, tmp_path):
