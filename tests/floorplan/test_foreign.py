@@ -9,7 +9,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import is_floorplan, load_floorplan
 
 
-def zipped(name: str) -> bytes:
+def zipped(name):
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr(name, "x" * 100)

@@ -1,14 +1,13 @@
 import pytest
 
 from fleet2d.floorplan.native import HOMES, bundled_names, read_bundled, read_native
-from fleet2d.floorplan.plan import FloorPlan
 
 
 @pytest.mark.parametrize("name", bundled_names())
 def test_bundled_home_is_what_the_reader_with_checks_reads(name):
     """They are read without checks: a coordinate that isn't a float would be stored as it is."""
 
-    def parts(plan: FloorPlan) -> str:
+    def parts(plan):
         regions = [(r.labels, r.shape.wkt, r.name, r.type) for r in plan.regions]
         return repr((plan.rooms, plan.doorways, plan.objects, plan.no_go, plan.entrance, regions))
 

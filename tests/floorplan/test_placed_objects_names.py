@@ -22,7 +22,7 @@ def test_two_of_one_name_are_refused():
 
 
 def test_repeated_names_get_the_next_free_number_with_a_note():
-    notes: list[str] = []
+    notes = []
 
     names = distinct_names(["Bath", "Bath", "Bath 2", None, "Bath", None], "rooms", notes)
 

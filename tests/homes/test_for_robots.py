@@ -42,7 +42,7 @@ def test_a_world_for_gazebo_has_solid_walls_exactly_where_the_home_has_no_free_s
     assert models.keys() == {"floor", "walls", *blocking}
 
 
-def corners(polyline: ET.Element) -> list[tuple[float, ...]]:
+def corners(polyline):
     return [tuple(map(float, point.text.split())) for point in polyline if point.tag == "point"]  # type: ignore[union-attr]
 
 

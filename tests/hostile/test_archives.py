@@ -32,7 +32,7 @@ BOMBS = Path(__file__).parent / "bombs"
 Reader = Callable[[Path], Any]
 
 
-def peak_mb(code: str, path: Path) -> tuple[str, float]:
+def peak_mb(code, path):
     """Run code in a process of its own; return its output, and the most memory that it took."""
     lines = (
         "from pathlib import Path",
@@ -56,15 +56,15 @@ def peak_mb(code: str, path: Path) -> tuple[str, float]:
 GOOD = dict(np.load(WEIGHTS))
 
 
-def npy(shape: str, descr: str = "'<f4'", data: bytes = b"", version: int = 1) -> bytes:
+def npy(shape, descr="'<f4'", data=b"", version=1):
     """An array whose header says anything."""
     head = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
     return b"\x93NUMPY" + bytes([version, 0]) + struct.pack("<H", len(head)) + head.encode() + data
 
 
-def members(**changes: bytes | None) -> dict[str, bytes]:
+def members(**changes):
     """The files of good weights, with some changed or left out."""
-    files: dict[str, bytes] = {}
+    files = {}
     for name, value in GOOD.items():
         buffer = io.BytesIO()
         np.lib.format.write_array(buffer, np.asanyarray(value))
@@ -73,7 +73,7 @@ def members(**changes: bytes | None) -> dict[str, bytes]:
     return {name: data for name, data in files.items() if changes.get(name[:-4], b"") is not None}
 
 
-def packed(path: Path, files: dict[str, bytes], method: int = zipfile.ZIP_STORED) -> Path:
+def packed(path, files, method=zipfile.ZIP_STORED):
     with zipfile.ZipFile(path, "w", method) as archive:
         for name, data in files.items():
             archive.writestr(name, data)
@@ -82,7 +82,7 @@ def packed(path: Path, files: dict[str, bytes], method: int = zipfile.ZIP_STORED
 
 ZEROS = npy(f"({2 << 20},)", "'|u1'") + bytes(2 << 20)
 DEEP = "{'descr': " + "(" * 4000 + "'f4'" + ")" * 4000 + "}"
-ARRAYS: dict[str, dict[str, bytes | None]] = {
+ARRAYS = {
     "pickle": {"o": npy("(1,)", "'|O'", pickle.dumps([os.getpid]))},
     "pickle-weight": {"bias": npy("(32,)", "'|O'", pickle.dumps(np.zeros(32, object)))},
     "hugeshape": {"bias": npy("(100000000000,)")},
@@ -190,24 +190,24 @@ POSE, GRID = "geometry_msgs/msg/PoseStamped", "nav_msgs/msg/OccupancyGrid"
 
 
 @cache
-def messages() -> Any:
+def messages():
     from rosbags.typesys import Stores, get_typestore
 
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
-def pose_message(types: Any, x: float, y: float) -> Any:
+def pose_message(types, x, y):
     kinds = types.types
     point = kinds["geometry_msgs/msg/Point"](x=x, y=y, z=0.0)
     turn = kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
     return kinds["geometry_msgs/msg/Pose"](position=point, orientation=turn)
 
 
-def stamp(types: Any, second: int) -> Any:
+def stamp(types, second):
     return types.types["builtin_interfaces/msg/Time"](sec=second, nanosec=0)
 
 
-def poses(types: Any, frame: str = "map") -> list[tuple[str, str, int, bytes]]:
+def poses(types, frame="map"):
     rows = []
     for second in range(1, 100):
         header = types.types["std_msgs/msg/Header"](stamp=stamp(types, second), frame_id=frame)
@@ -216,7 +216,7 @@ def poses(types: Any, frame: str = "map") -> list[tuple[str, str, int, bytes]]:
     return rows
 
 
-def grid(types: Any, side: int, x: float = 0.0, y: float = 0.0) -> tuple[str, str, int, bytes]:
+def grid(types, side, x=0.0, y=0.0):
     kinds = types.types
     info = kinds["nav_msgs/msg/MapMetaData"](
         map_load_time=stamp(types, 0),
@@ -231,12 +231,12 @@ def grid(types: Any, side: int, x: float = 0.0, y: float = 0.0) -> tuple[str, st
     return "/map", GRID, 1, bytes(types.serialize_cdr(message, GRID))
 
 
-def bag(path: Path, rows: list[tuple[str, str, int, bytes]], storage: str = "SQLITE3") -> Path:
+def bag(path, rows, storage="SQLITE3"):
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     types = messages()
     with Writer(path, version=8, storage_plugin=StoragePlugin[storage]) as writer:
-        connections: dict[str, Any] = {}
+        connections = {}
         for topic, kind, second, data in rows:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=types)
@@ -254,11 +254,11 @@ def good(tmp_path):
     return bag(tmp_path / "bag", poses(messages()))
 
 
-def database(folder: Path) -> Path:
+def database(folder):
     return next(folder.glob("*.db3"))
 
 
-def tamper(folder: Path, *statements: str) -> None:
+def tamper(folder, *statements):
     connection = sqlite3.connect(database(folder))
     for statement in statements:
         connection.execute(statement)
@@ -266,7 +266,7 @@ def tamper(folder: Path, *statements: str) -> None:
     connection.close()
 
 
-def compress(folder: Path, mode: str) -> None:
+def compress(folder, mode):
     """Say that messages, or files, are compressed."""
     path = folder / "metadata.yaml"
     text = path.read_text()
@@ -274,20 +274,20 @@ def compress(folder: Path, mode: str) -> None:
     path.write_text(text.replace("compression_mode: ''", f"compression_mode: {mode}"))
 
 
-def refusal(path: Path, read: Reader = read_bag) -> str:
+def refusal(path, read=read_bag):
     with pytest.raises(InputError) as caught:
         read(path)
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
 
-def limit_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def limit_memory(monkeypatch):
     """Let a new child, which has no memory yet, take 60 MB."""
     monkeypatch.setenv("FLEET2D_MAX_READ_MB", "60")
     apart._stop()
 
 
-def read_map(path: Path) -> Any:
+def read_map(path):
     return BagMap(path=path).load()
 
 
@@ -412,7 +412,7 @@ def test_a_damaged_bag_is_refused(tmp_path, storage, name):
     assert str(folder) in refusal(folder)
 
 
-METADATA: dict[str, Callable[[str], str]] = {
+METADATA = {
     "empty": lambda text: "",
     "list": lambda text: "[1, 2]",
     "deep": lambda text: "[" * 5000 + "]" * 5000,

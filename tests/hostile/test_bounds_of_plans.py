@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,49 +35,49 @@ print(seconds + child.ru_utime + child.ru_stime, max(megabytes, child.ru_maxrss 
 """
 
 
-def pgm(path: Path, shades: np.ndarray) -> Path:
+def pgm(path, shades):
     rows, columns = shades.shape
     path.write_bytes(b"P5\n%d %d\n255\n" % (columns, rows) + shades.tobytes())
     return path
 
 
-def framed(side: int) -> np.ndarray:
+def framed(side):
     """Return a white picture within a black line."""
     shades = np.full((side, side), 255, np.uint8)
     shades[[0, -1]] = shades[:, [0, -1]] = 0
     return shades
 
 
-def white(folder: Path) -> Path:
+def white(folder):
     return pgm(folder / "home.pgm", np.full((5000, 5000), 255, np.uint8))
 
 
-def one_row(folder: Path) -> Path:
+def one_row(folder):
     return pgm(folder / "home.pgm", np.full((1, 1 << 25), 255, np.uint8))
 
 
-def half_a_row(folder: Path) -> Path:
+def half_a_row(folder):
     return pgm(folder / "home.pgm", np.full((1, 1 << 24), 255, np.uint8))
 
 
-def largest_picture(folder: Path) -> Path:
+def largest_picture(folder):
     return pgm(folder / "home.pgm", framed(4096))
 
 
-def largest_hall(folder: Path) -> Path:
+def largest_hall(folder):
     """Write a hall of 10 million pixels in the largest picture."""
     shades = np.full((4096, 4096), 205, np.uint8)
     shades[:3150, :3150] = framed(3150)
     return pgm(folder / "home.pgm", shades)
 
 
-def combs(folder: Path) -> Path:
+def combs(folder):
     shades = framed(3150)
     shades[10:-10, ::12] = 0
     return pgm(folder / "home.pgm", shades)
 
 
-def pillars(folder: Path) -> Path:
+def pillars(folder):
     shades = framed(4096)
     for row in range(4):
         for column in range(4):
@@ -86,20 +85,20 @@ def pillars(folder: Path) -> Path:
     return pgm(folder / "home.pgm", shades)
 
 
-def noise(folder: Path) -> Path:
+def noise(folder):
     shades = framed(4096)
     shades[np.random.default_rng(0).random(shades.shape) > 0.7] = 0
     return pgm(folder / "home.pgm", shades)
 
 
-def comb_of(teeth: int) -> list[list[float]]:
+def comb_of(teeth):
     """Return the corners of a home of 60 m with thin teeth along a wall."""
     xs = np.linspace(60, 0, 2 * teeth + 1)[1:-1]
     tips = [[round(float(x), 6), 10.0 if k % 2 else 5.0] for k, x in enumerate(xs)]
     return [[0, 0], [60, 0], *tips, [0, 10]]
 
 
-def geojson(folder: Path, corners: list[list[float]]) -> Path:
+def geojson(folder, corners):
     room = {
         "type": "Feature",
         "properties": {"kind": "room"},
@@ -111,31 +110,31 @@ def geojson(folder: Path, corners: list[list[float]]) -> Path:
     return path
 
 
-def teeth_at_the_bound(folder: Path) -> Path:
+def teeth_at_the_bound(folder):
     return geojson(folder, comb_of(4_800))
 
 
-def too_many_teeth(folder: Path) -> Path:
+def too_many_teeth(folder):
     return geojson(folder, comb_of(60_000))
 
 
-def most_values(folder: Path) -> Path:
+def most_values(folder):
     angles = np.linspace(0, 2 * np.pi, 990_000, endpoint=False)
     corners = np.round(np.stack([50 * np.cos(angles), 50 * np.sin(angles)], axis=1), 4)
     return geojson(folder, corners.tolist())
 
 
-def native(folder: Path, *parts: list[list[float]]) -> Path:
+def native(folder, *parts):
     path = folder / "home.json"
     path.write_text(json.dumps({"format": "fleet2d-floorplan", "version": 1, "free": parts}))
     return path
 
 
-def largest_square(folder: Path) -> Path:
+def largest_square(folder):
     return native(folder, [[0, 0], [157, 0], [157, 157], [0, 157]])
 
 
-def written(folder: Path, name: str, package: str, *parts: str) -> Path:
+def written(folder, name, package, *parts):
     pytest.importorskip(package)
     path = folder / name
     path.write_text("".join(parts), encoding="utf-8")
@@ -148,28 +147,28 @@ INSERT = "  0\nINSERT\n  8\nwall\n  2\nB\n 10\n0\n 20\n0\n"
 BLOCK = f"  0\nBLOCK\n  8\n0\n  2\nB\n 70\n0\n 10\n0\n 20\n0\n  3\nB\n{LINE * 1000}  0\nENDBLK\n  8\n0\n"
 
 
-def section(name: str, text: str) -> str:
+def section(name, text):
     return f"  0\nSECTION\n  2\n{name}\n{text}  0\nENDSEC\n"
 
 
-def lines_of_dxf(folder: Path) -> Path:
+def lines_of_dxf(folder):
     return written(
         folder, "many.dxf", "ezdxf", section("ENTITIES", LINE * 700_000), "  0\nEOF\n"
     )  # fmt: skip
 
 
-def inserts_of_dxf(folder: Path) -> Path:
+def inserts_of_dxf(folder):
     entities = section("ENTITIES", INSERT * 100_000)
     parts = (section("BLOCKS", BLOCK), entities, "  0\nEOF\n")
     return written(folder, "13-inserts.dxf", "ezdxf", *parts)
 
 
-def shapes_of_svg(folder: Path) -> Path:
+def shapes_of_svg(folder):
     shapes = '<rect class="wall" width="9" height="9"/>' * 400_000
     return written(folder, "many.svg", "svgelements", SVG, shapes, "</svg>")
 
 
-def uses_of_svg(folder: Path) -> Path:
+def uses_of_svg(folder):
     groups = ['<g id="a0"><rect class="wall" width="1" height="1"/></g>']
     for number in range(1, 8):
         copies = f'<use xlink:href="#a{number - 1}"/>' * 10
@@ -178,12 +177,12 @@ def uses_of_svg(folder: Path) -> Path:
     return written(folder, "07-use.svg", "svgelements", *parts)
 
 
-def walls_of_sweet_home(folder: Path) -> Path:
+def walls_of_sweet_home(folder):
     wall = '<wall xStart="0" yStart="0" xEnd="100" yEnd="0" thickness="7"/>'
     return written(folder, "wide.xml", "shapely", "<home>", wall * 800_000, "</home>")
 
 
-def crossing_walls(folder: Path) -> Path:
+def crossing_walls(folder):
     """Write lines of walls, each of which crosses a quarter of the others."""
     ends = np.random.default_rng(0).random((2_400, 2, 2)).round(4) * 60
     walls = [
@@ -200,28 +199,28 @@ def crossing_walls(folder: Path) -> Path:
     return path
 
 
-def crossing_parts(folder: Path) -> Path:
+def crossing_parts(folder):
     """Write free space of thin parts, each of which crosses a quarter of the others."""
     ends = np.random.default_rng(0).random((2_500, 2, 2)).round(4) * 60
     return native(folder, *([a, b, [b[0] + 0.02, b[1] + 0.02]] for a, b in ends.tolist()))
 
 
-def too_large_a_square(folder: Path) -> Path:
+def too_large_a_square(folder):
     return native(folder, [[0, 0], [223, 0], [223, 223], [0, 223]])
 
 
-def most_teeth(folder: Path) -> Path:
+def most_teeth(folder):
     return native(folder, comb_of(12_490))
 
 
-def parts_and_teeth(folder: Path) -> Path:
+def parts_and_teeth(folder):
     """Write a file that is small, with as many crossing parts and teeth as are read."""
     corners = [[x, y + 60] for x, y in comb_of(1_500)]
     ends = np.random.default_rng(0).random((140, 2, 2)).round(2) * 60
     return native(folder, corners, *([a, b, [b[0] + 0.2, b[1] + 0.2]] for a, b in ends.tolist()))
 
 
-def too_many_boxes(folder: Path) -> Path:
+def too_many_boxes(folder):
     boxes = np.random.default_rng(0).random((4_900, 4)).round(3) * 60
     square = [[0, 0], [60, 0], [60, 60], [0, 60]]
     path = folder / "home.json"

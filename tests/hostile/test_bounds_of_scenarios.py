@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from tests.thorough import THOROUGH
@@ -26,7 +25,7 @@ print(usage.ru_utime + usage.ru_stime, int(status.split('VmHWM:')[1].split()[0])
 BASE = "extends: bundled:paper\n"
 
 
-def bombs(n: int) -> dict[str, tuple[str, str]]:
+def bombs(n):
     """Scenarios of `n` values or entries and more, and a part of the message each."""
     return {
         "extends": (f"extends: [{', '.join(['bundled:paper'] * n)}]", "at most 100 are read"),
@@ -129,7 +128,7 @@ def test_a_household_has_a_bound(tmp_path):
         load_scenario(tmp_path / "home.yaml")
 
 
-def persona_files(folder: Path, n: int) -> None:
+def persona_files(folder, n):
     """Personas that each extend the next one twice: read in turn they are 2 ** n files."""
     for i in range(n):
         (folder / f"own{i}.yaml").write_text(f"extends: [own{i + 1}.yaml, own{i + 1}.yaml]")
@@ -150,7 +149,7 @@ def test_a_persona_extends_a_bounded_number_of_files(tmp_path, persona):
         load_scenario(tmp_path / "home.yaml")
 
 
-def house(folder: Path, members: int) -> Path:
+def house(folder, members):
     """Write a scenario with a household whose members have one persona of their own."""
     names = [f"u{i}" for i in range(members)]
     (folder / "own.yaml").write_text("extends: retired\npace: 0.9\n")

@@ -10,7 +10,6 @@ import random
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -32,11 +31,11 @@ STUDY = small(replicates=2, keep={"tables": ["room_share"]}, compare=COMPARE)
 Damage = Callable[[Path], None]
 
 
-def _cut(path: Path) -> None:
+def _cut(path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
-def _flip(path: Path, seed: int = 1) -> None:
+def _flip(path, seed=1):
     content = bytearray(path.read_bytes())
     chance = random.Random(seed)
     for _ in range(8):
@@ -44,17 +43,17 @@ def _flip(path: Path, seed: int = 1) -> None:
     path.write_bytes(content)
 
 
-def _as_folder(path: Path) -> None:
+def _as_folder(path):
     path.unlink()
     path.mkdir()
 
 
-def _as_link(path: Path) -> None:
+def _as_link(path):
     path.unlink()
     path.symlink_to("/nowhere/at/all")
 
 
-BYTES: dict[str, Damage] = {
+BYTES = {
     "empty": lambda path: path.write_bytes(b"") and None,
     "cut": _cut,
     "flipped": _flip,
@@ -64,33 +63,33 @@ BYTES: dict[str, Damage] = {
     "folder": _as_folder,
     "link": _as_link,
 }
-VALUES: tuple[Any, ...] = (None, [], {}, 7, "text", "\x1b[2J", [[1]], {"a": 1}, -(2**70))
+VALUES = (None, [], {}, 7, "text", "\x1b[2J", [[1]], {"a": 1}, -(2**70))
 
 
-def _set_value(path: Path, key: str, value: Any) -> None:
+def _set_value(path, key, value):
     content = json.loads(path.read_text())
     content[key] = value
     path.write_text(json.dumps(content))
 
 
-def _with_number(table: pa.Table, number: int) -> pa.Table:
+def _with_number(table, number):
     """Return a table whose last row has another number of a variant."""
     numbers = [*table["variant"].to_pylist()[:-1], number]
     column = table.column_names.index("variant")
     return table.set_column(column, "variant", pa.array(numbers, pa.int32()))
 
 
-def _forge(path: Path, files: Any) -> None:
+def _forge(path, files):
     """Write results that name other files of tables."""
     metadata = {"fleet2d.tables": json.dumps(files)}
     pq.write_table(pq.read_table(path).replace_schema_metadata(metadata), path)
 
 
-def _change_table(path: Path, change: Callable[[pa.Table], pa.Table]) -> None:
+def _change_table(path, change):
     pq.write_table(change(pq.read_table(path)), path)
 
 
-TABLES: dict[str, Callable[[pa.Table], pa.Table]] = {
+TABLES = {
     "no columns": lambda table: table.select([]),
     "first column only": lambda table: table.select([0]),
     "last column only": lambda table: table.select([table.num_columns - 1]),
@@ -105,7 +104,7 @@ TABLES: dict[str, Callable[[pa.Table], pa.Table]] = {
         {name: pa.nulls(table.num_rows) for name in table.column_names}
     ).replace_schema_metadata(table.schema.metadata),
 }
-CASES: list[tuple[str, str, Damage]] = [
+CASES = [
     *((file, name, damage) for file in (*JSON, *PARQUET) for name, damage in BYTES.items()),
     *(
         ("study.json", f"{key}={value!r}", lambda p, k=key, v=value: _set_value(p, k, v))

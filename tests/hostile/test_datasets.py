@@ -3,9 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -25,8 +23,7 @@ MANIFEST = "dataset.json"
 
 @pytest.fixture(scope="module")
 def whole():
-    root: Path = made().root
-    return root
+    return made().root
 
 
 @pytest.fixture
@@ -42,21 +39,21 @@ def elsewhere(tmp_path, whole):
     return folder
 
 
-def verify(root: Path) -> None:
+def verify(root):
     open_dataset(root).verify()
 
 
-def learn(root: Path) -> None:
+def learn(root):
     data = open_dataset(root)
     for window in windows(data, "train"):
         assert np.isfinite(window.features).all()
 
 
-def score(root: Path) -> None:
+def score(root):
     leaderboard(open_dataset(root))
 
 
-USES: dict[str, Callable[[Path], Any]] = {
+USES = {
     "make": make,
     "verify": verify,
     "train": learn,
@@ -64,23 +61,23 @@ USES: dict[str, Callable[[Path], Any]] = {
 }
 
 
-def link(path: Path, elsewhere: Path) -> None:
+def link(path, elsewhere):
     path.symlink_to(elsewhere / path.name)
 
 
-def link_to_secret(path: Path, elsewhere: Path) -> None:
+def link_to_secret(path, elsewhere):
     path.symlink_to(elsewhere / "secret.txt")
 
 
-def endless(path: Path, _: Path) -> None:
+def endless(path, _):
     path.symlink_to("/dev/zero")
 
 
-def pipe(path: Path, _: Path) -> None:
+def pipe(path, _):
     os.mkfifo(path)
 
 
-def folder(path: Path, _: Path) -> None:
+def folder(path, _):
     path.mkdir()
 
 
@@ -112,21 +109,21 @@ def test_files_that_are_lacking_are_not_made_through_a_link(copy, elsewhere, nam
     assert f"{target} is a link" in attack(copy, elsewhere, make)
 
 
-def change(**changes: Any) -> Callable[[dict[str, Any]], None]:
+def change(**changes):
     return lambda manifest: manifest.update(changes)
 
 
-def lack(key: str) -> Callable[[dict[str, Any]], None]:
+def lack(key):
     return lambda manifest: manifest.pop(key)
 
 
-def add_file(name: str) -> Callable[[dict[str, Any]], None]:
+def add_file(name):
     record = {"rows": 1, "bytes": 1, "sha256": "0" * 64}
     return lambda manifest: manifest["files"].update({name: record})
 
 
-def rename_split(name: str) -> Callable[[dict[str, Any]], None]:
-    def rename(manifest: dict[str, Any]) -> None:
+def rename_split(name):
+    def rename(manifest):
         manifest["splits"] = {name: 3}
         manifest["files"] = {
             old.replace("train/", f"{name}/"): file for old, file in manifest["files"].items()
@@ -135,11 +132,11 @@ def rename_split(name: str) -> Callable[[dict[str, Any]], None]:
     return rename
 
 
-def lack_table(manifest: dict[str, Any]) -> None:
+def lack_table(manifest):
     manifest["files"] = {n: file for n, file in manifest["files"].items() if "rooms" not in n}
 
 
-FORGED: dict[str, Callable[[dict[str, Any]], Any]] = {
+FORGED = {
     "m-outside-split": rename_split("../../outside"),
     "m-outside-abs": rename_split("/tmp/outside"),
     "m-verify-outside": add_file("../../../../../../etc/hostname"),
@@ -196,19 +193,19 @@ def test_a_manifest_that_is_a_folder_is_refused(copy, elsewhere):
 # Tables
 
 
-def constant(value: Any) -> Callable[[pa.Array], pa.Array]:
+def constant(value):
     return lambda column: pa.array([value] * len(column), column.type)
 
 
-def null(column: pa.Array) -> pa.Array:
+def null(column):
     return pa.nulls(len(column), column.type)
 
 
-def as_list(column: pa.Array) -> pa.Array:
+def as_list(column):
     return pa.array([[value] for value in column.to_pylist()])
 
 
-def alike(kind: pa.DataType) -> dict[str, Callable[[pa.Array], pa.Array]]:
+def alike(kind):
     """Ways of forging a column of a type."""
     forged = {"null": null, "list": as_list}
     if pa.types.is_floating(kind):
@@ -229,7 +226,7 @@ COLUMNS = [
 ]
 
 
-def forge(root: Path, table: str, change: Callable[[pa.Table], pa.Table]) -> None:
+def forge(root, table, change):
     for path in root.glob(f"*/{table}-*"):
         pq.write_table(change(pq.ParquetFile(path).read()), path)
 
@@ -237,7 +234,7 @@ def forge(root: Path, table: str, change: Callable[[pa.Table], pa.Table]) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize(("table", "column", "way"), some(COLUMNS, 3))
 def test_a_forged_column_is_refused_or_harmless(copy, elsewhere, table, column, way):
-    def change(content: pa.Table) -> pa.Table:
+    def change(content):
         index = content.column_names.index(column)
         new = alike(SCHEMAS[table].field(column).type)[way](content[column])
         return content.set_column(index, column, new)
@@ -253,7 +250,7 @@ def test_a_forged_column_is_refused_or_harmless(copy, elsewhere, table, column, 
 @pytest.mark.parametrize("table", SCHEMAS)
 @pytest.mark.parametrize("damage", ["gone", "cut", "zero", "names", "missing", "empty"])
 def test_a_damaged_table_is_refused_or_harmless(copy, elsewhere, table, damage):
-    changes: dict[str, Callable[[pa.Table], pa.Table]] = {
+    changes = {
         "names": lambda t: t.rename_columns([f"x{name}" for name in t.column_names]),
         "missing": lambda t: t.drop_columns([t.column_names[0]]),
         "empty": lambda t: t.slice(0, 0),
@@ -303,7 +300,7 @@ def test_a_forged_record_or_part_of_an_unfinished_one_is_made_again_or_refused(c
 def test_names_of_models_are_printed_without_control_characters(copy, capsys):
     from fleet2d.learning.datasets.command import _print_scores
 
-    def change(content: pa.Table) -> pa.Table:
+    def change(content):
         index = content.column_names.index("model")
         names = [n.replace("last_seen", "\x1b[31mred") for n in content["model"].to_pylist()]
         return content.set_column(index, "model", pa.array(names))

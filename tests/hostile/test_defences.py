@@ -8,19 +8,19 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from tests.hostile.defences import DEFENCES, Defence
+from tests.hostile.defences import DEFENCES
 from tests.thorough import some
 
 TESTS = Path(__file__).parent.parent
 MEMORY = 8 << 30
 
 
-def limit_memory() -> None:
+def limit_memory():
     """Let nothing that was defended against fill the memory of the machine."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
-def source_of(defence: Defence) -> str:
+def source_of(defence):
     spec = find_spec(f"fleet2d.{defence.module}")
     assert spec is not None
     return Path(str(spec.origin)).read_text(encoding="utf-8")

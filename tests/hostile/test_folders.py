@@ -10,12 +10,9 @@ import json
 import os
 import shutil
 import threading
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import timedelta
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.engine.test_repeat_resume import cut_off
@@ -33,7 +30,7 @@ from fleet2d.viewing.page_data import export_html
 SECRET = "precious, and nobody's business"
 
 
-def read_all(run: Path) -> None:
+def read_all(run):
     opened = open_run(run)
     _ = opened.plan, opened.metrics, repr(opened), opened.notes
     for name in opened.tables:
@@ -42,32 +39,32 @@ def read_all(run: Path) -> None:
         opened.verify()
 
 
-def rebuild(run: Path) -> None:
+def rebuild(run):
     open_run(run).path("ana", timedelta(minutes=5))
 
 
-def to_page(run: Path) -> None:
+def to_page(run):
     export_html(open_run(run), run.parent / "page.html")
 
 
-def to_sensors(run: Path) -> None:
+def to_sensors(run):
     opened = open_run(run)
     exporter("casas")(opened, run.parent / "sensors.txt", Selection.of(opened))
 
 
-def to_film(run: Path) -> None:
+def to_film(run):
     from fleet2d.viewing.film import write_film
 
     write_film(open_run(run), run / "film.gif", 0, 60, height=120)
 
 
-def to_picture(run: Path) -> None:
+def to_picture(run):
     from fleet2d.viewing.pictures.run import draw_run
 
     draw_run(open_run(run), run / "picture.png")
 
 
-READERS: dict[str, Callable[[Path], Any]] = {
+READERS = {
     "open": read_all,
     "verify": verify_run,
     "path": rebuild,
@@ -77,7 +74,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "reproduce": reproduce,
 }
 # They make figures, which takes longer.
-PAINTERS: dict[str, Callable[[Path], Any]] = {
+PAINTERS = {
     "show": to_picture,
     "film": to_film,
 }
@@ -89,28 +86,28 @@ FILES = (
 )  # fmt: skip
 
 
-def link_to_file(path: Path, elsewhere: Path) -> None:
+def link_to_file(path, elsewhere):
     path.symlink_to(elsewhere / "secret.txt")
 
 
-def link_to_like(path: Path, elsewhere: Path) -> None:
+def link_to_like(path, elsewhere):
     """Link to a file or folder that the command would understand."""
     path.symlink_to(elsewhere / "run" / path.name)
 
 
-def link_to_folder(path: Path, elsewhere: Path) -> None:
+def link_to_folder(path, elsewhere):
     path.symlink_to(elsewhere)
 
 
-def link_to_nowhere(path: Path, elsewhere: Path) -> None:
+def link_to_nowhere(path, elsewhere):
     path.symlink_to(elsewhere / "new")
 
 
-def pipe(path: Path, _: Path) -> None:
+def pipe(path, _):
     os.mkfifo(path)
 
 
-def folder(path: Path, _: Path) -> None:
+def folder(path, _):
     path.mkdir()
     (path / "journal").write_text("?")
 
@@ -120,13 +117,13 @@ ATTACKS = [(name, trick) for name in FILES for trick in TRICKS]
 
 
 @cache
-def complete(root: Path) -> Path:
+def complete(root):
     fleet2d.run(everything("10 min"), out=root / "complete")
     return root / "complete"
 
 
 @cache
-def unfinished(root: Path) -> Path:
+def unfinished(root):
     content = everything("10 min")
     content["artifacts"] = {**content["artifacts"], "checkpoint": "1 min"}
     simulation = fleet2d.Simulation(content, out=root / "unfinished")
@@ -150,7 +147,7 @@ def elsewhere(tmp_path, root):
     return folder
 
 
-def state_of(folder: Path) -> dict[str, str]:
+def state_of(folder):
     """All names below a folder, with a digest of each file's content."""
     return {
         path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
@@ -161,12 +158,12 @@ def state_of(folder: Path) -> dict[str, str]:
 
 
 @contextmanager
-def no_waiting(run: Path) -> Iterator[None]:
+def no_waiting(run):
     """Fail if a pipe in a folder is waited for; whoever does is freed."""
     is_over = threading.Event()
-    waited_for: list[Path] = []
+    waited_for = []
 
-    def watch() -> None:
+    def watch():
         while not is_over.wait(0.2):
             for path in run.rglob("*"):
                 with suppress(OSError):  # nobody reads it
@@ -184,7 +181,7 @@ def no_waiting(run: Path) -> Iterator[None]:
     assert [] == waited_for
 
 
-def attack(run: Path, elsewhere: Path, use: Callable[[Path], Any]) -> str:
+def attack(run, elsewhere, use):
     """Use a folder; return the message that refuses it, or nothing."""
     before, message = state_of(elsewhere), ""
     with no_waiting(run):

@@ -8,7 +8,6 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -40,7 +39,7 @@ def run(genuine, tmp_path):
     return Path(shutil.copytree(genuine, tmp_path / "run"))
 
 
-def rewrite(run: Path, table: str, change: Change) -> None:
+def rewrite(run, table, change):
     """Rewrite a table with its metadata, as anybody could with pyarrow."""
     path = run / f"{table}.parquet"
     stored = pq.read_table(path)
@@ -48,29 +47,29 @@ def rewrite(run: Path, table: str, change: Change) -> None:
     pq.write_table(changed.cast(stored.schema), path)
 
 
-def seal_anew(run: Path, change: Callable[[Manifest], None] = lambda _: None) -> None:
+def seal_anew(run, change=lambda _: None):
     manifest = Manifest.read(run)
     change(manifest)
     manifest.seal = make_seal(manifest, run)
     manifest.write(run)
 
 
-def with_column(table: pa.Table, name: str, values: Any) -> pa.Table:
+def with_column(table, name, values):
     at = table.column_names.index(name)
     return table.set_column(at, table.schema.field(at), pa.chunked_array([values]))
 
 
-def moved(table: pa.Table) -> pa.Table:
+def moved(table):
     return with_column(table, "x", pa.array(table["x"].to_numpy() + 1.5))
 
 
-def swapped(table: pa.Table) -> pa.Table:
+def swapped(table):
     order = [*range(table.num_rows)]
     order[0], order[-1] = order[-1], order[0]
     return table.take(order)
 
 
-FORGERIES: dict[str, tuple[str, Change]] = {
+FORGERIES = {
     "moved by 1.5 m": ("trajectories", moved),
     "moved key frames": ("key_frames", moved),
     "fewer rows": ("key_frames", lambda table: table.slice(0, table.num_rows - 1)),
@@ -84,7 +83,7 @@ FORGERIES: dict[str, tuple[str, Change]] = {
 }
 
 
-def differing(run: Path) -> list[str]:
+def differing(run):
     verification = verify_run(run)
     assert verification.same == (not verification.differing)
     return list(verification.differing)
@@ -111,7 +110,7 @@ def test_a_rewritten_table_under_a_new_seal_is_not_reproduced(run, name):
 def test_only_an_exact_repetition_notices_a_forgery_without_contradictions(run):
     """Digests of the forged rows, a digest of these digests, a seal: who has them, has another run."""
 
-    def vouch(manifest: Manifest) -> None:
+    def vouch(manifest):
         table = digest_table(pq.read_table(run / "trajectories.parquet"))
         record = manifest.tables["trajectories"].model_copy(update={"digest": table})
         manifest.tables["trajectories"] = record
@@ -129,11 +128,11 @@ def test_only_an_exact_repetition_notices_a_forgery_without_contradictions(run):
     assert ["trajectories"] == result.differing
 
 
-def record(manifest: Manifest, **fields: Any) -> None:
+def record(manifest, **fields):
     manifest.tables["events"] = manifest.tables["events"].model_copy(update=fields)
 
 
-def other_unit(manifest: Manifest) -> None:
+def other_unit(manifest):
     columns = [
         column.model_copy(update={"unit": "km"}) for column in manifest.tables["events"].columns
     ]

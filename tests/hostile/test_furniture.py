@@ -4,9 +4,7 @@ Judged by the spaces that bodies move in, not by the cells with which furniture 
 connected for a body stays connected, and a body can stand wherever furniture is used from.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,7 +27,7 @@ CUT_OFF_M2 = 0.25
 KINDS = ("bedroom", "living_room", "kitchen", "bathroom", "office", "dining_room", "child_room")
 
 
-def parts_cut_off(empty: FloorPlan, plan: FloorPlan) -> list[tuple[float, float]]:
+def parts_cut_off(empty, plan):
     """Return radius and area [m²] of what furniture cuts off from the spaces of the empty home.
 
     Areas are those of the outlines between which bodies move: cells of 0.2 m measured 0.26 m² as
@@ -50,7 +48,7 @@ def parts_cut_off(empty: FloorPlan, plan: FloorPlan) -> list[tuple[float, float]
     return cut
 
 
-def places_outside(plan: FloorPlan) -> list[str]:
+def places_outside(plan):
     """Return the places of use that lie in a wall, or from which no body can step there."""
     space, free = Home(plan).space(BODY_RADIUS), plan.free_space
     return [
@@ -63,7 +61,7 @@ def places_outside(plan: FloorPlan) -> list[str]:
     ]
 
 
-def check(empty: FloorPlan, seed: int = 0, density: float = 1.0) -> int:
+def check(empty, seed=0, density=1.0):
     """Furnish a home and judge it; return the number of pieces."""
     plan = furnish(empty, seed, density)
 
@@ -72,10 +70,10 @@ def check(empty: FloorPlan, seed: int = 0, density: float = 1.0) -> int:
     return len(plan.objects)
 
 
-def two_rooms(width: float, degrees: float, kind: str) -> FloorPlan:
+def two_rooms(width, degrees, kind):
     """Return two rooms with a gap of a width [m] in the wall between them, turned."""
 
-    def turned(shape: Polygon) -> Polygon:
+    def turned(shape):
         return shapely.affinity.rotate(shape, degrees, origin=(0, 0))
 
     rooms = shapely.box(0, 0, 4, 3.5), shapely.box(4.1, 0, 8, 3.5)
@@ -101,8 +99,8 @@ def test_a_narrow_gap_stays_passable(width, degrees):
             check(plan, seed)
 
 
-def turned_home(plan: FloorPlan, degrees: float, cell: float) -> FloorPlan:
-    def turned(shape: shapely.Geometry) -> shapely.Geometry:
+def turned_home(plan, degrees, cell):
+    def turned(shape):
         return shapely.affinity.rotate(shape, degrees, origin=(0, 0))
 
     regions = [replace(region, shape=turned(region.shape)) for region in plan.regions]
@@ -123,7 +121,7 @@ def test_turned_homes_stay_connected(degrees, cell, shared_data):
     assert furnished >= 3
 
 
-def slanted_room(number: int, kind: str) -> FloorPlan:
+def slanted_room(number, kind):
     rng = np.random.default_rng(number)
     corners = rng.integers(4, 8)
     angle, away = np.sort(rng.uniform(0, 2 * np.pi, corners)), rng.uniform(2, 4.5, corners)
@@ -147,7 +145,7 @@ def test_slanted_rooms_stay_connected(number):
             check(plan, seed)
 
 
-def captured(folder: Path) -> Iterator[FloorPlan]:
+def captured(folder):
     """Yield homes as robots and scanners deliver them, their rooms with types in turn."""
     names = ["homes/movecare_map.yaml"]
     if THOROUGH:

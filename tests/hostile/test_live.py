@@ -8,8 +8,6 @@ import threading
 import time
 import urllib.request
 from datetime import timedelta
-from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -40,9 +38,9 @@ PLACES = (
 CAMERA = {"range": [0.2, 4], "angle_deg": 120, "detection": 0.7, "lost_after": "4 s"}
 
 
-def home(*, doors: bool) -> dict[str, Any]:
+def home(*, doors):
     """People and robots of all kinds; with doors that hinder them, or without."""
-    objects: dict[str, Any] = {
+    objects = {
         "motion": {"type": "motion_sensor", "at": [6.0, 1.0], "range": "3 m"},
     }
     if doors:
@@ -80,11 +78,11 @@ def home(*, doors: bool) -> dict[str, Any]:
     )
 
 
-def any_of(*values: Any) -> st.SearchStrategy[Any]:
+def any_of(*values):
     return st.sampled_from(values)
 
 
-def act(verb: str, names: st.SearchStrategy[Any], **fields: Any) -> st.SearchStrategy[Any]:
+def act(verb, names, **fields):
     return st.fixed_dictionaries({verb: names}, optional=fields)
 
 
@@ -159,7 +157,7 @@ ORDERS = st.tuples(
 )
 
 
-def request(run: fleet2d.Simulation, order: Any) -> None:
+def request(run, order):
     """Request something; nothing may go wrong but that it is refused."""
     try:
         if isinstance(order, tuple):
@@ -187,12 +185,12 @@ def test_no_intervention_lets_a_run_fail(doors, orders):
     assert stored.digest == again.run().digest
 
 
-def decide(run: fleet2d.Simulation) -> None:
+def decide(run):
     run.drive("astro")
     run.do(Decide("astro", data_of(run.plan("astro").go_to("kitchen").stay())))
 
 
-def put(run: fleet2d.Simulation) -> None:
+def put(run):
     run.do(Put("astro", "bedroom"))
 
 
@@ -241,7 +239,7 @@ LATER = {"at": "07:05", "send": "ana", "to": "kitchen"}
 def test_what_waits_for_its_time_survives_a_kill(tmp_path, act, seconds):
     """An intervention that waited for an event was lost if no checkpoint had been written yet."""
 
-    def steered(**more: Any) -> fleet2d.Simulation:
+    def steered(**more):
         run = fleet2d.Simulation(home(doors=False), **more)
         run.advance(20)
         run.do(act)
@@ -261,7 +259,7 @@ def test_what_waits_for_its_time_survives_a_kill(tmp_path, act, seconds):
 def test_what_has_happened_after_a_wait_happens_once(tmp_path, checkpoint):
     """From the last checkpoint on, the wait and its record in the manifest both took effect."""
 
-    def steered(**more: Any) -> fleet2d.Simulation:
+    def steered(**more):
         content = home(doors=False)
         content["artifacts"]["checkpoint"] = checkpoint
         run = fleet2d.Simulation(content, **more)
@@ -296,7 +294,7 @@ def test_only_events_after_a_request_count():
 class Page:
     """A page of a running simulation, in a process of its own."""
 
-    def __init__(self, out: Path) -> None:
+    def __init__(self, out):
         command = [sys.executable, "-m", "fleet2d.cli", "view", "bundled:paper", "--no-browser"]
         options = ["--seed", "4", "--out", str(out), "simulation.duration=20 d"]
         pipe = subprocess.PIPE
@@ -305,7 +303,7 @@ class Page:
         self.address = self.process.stdout.readline().strip().rstrip("/")
         self.frames = 0
 
-    def order(self, action: str, target: str = "", value: float = 0, **place: float) -> None:
+    def order(self, action, target="", value=0, **place):
         content = {
             "action": action,
             "target": target,
@@ -321,7 +319,7 @@ class Page:
         url, data = f"{self.address}/live/0/order", json.dumps(content).encode()
         urllib.request.urlopen(urllib.request.Request(url, data, headers)).read()
 
-    def watch(self) -> None:
+    def watch(self):
         """Read the stream of frames until the server ends it."""
         with urllib.request.urlopen(f"{self.address}/live/0/frames") as stream:
             for _ in stream:

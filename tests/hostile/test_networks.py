@@ -3,7 +3,6 @@
 import os
 import shutil
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,7 +14,7 @@ pytest.importorskip("onnxruntime", reason="onnxruntime isn't installed")
 BOMBS = Path(__file__).parent / "bombs"
 
 
-def content(file: Path) -> dict[str, Any]:
+def content(file):
     return {
         "floorplan": {"type": "synthetic", "seed": 0, "area_m2": 80},
         "simulation": {"start": "2026-01-05", "duration": "2 h", "seed": 1},
@@ -24,7 +23,7 @@ def content(file: Path) -> dict[str, Any]:
     }
 
 
-def model(file: Path) -> dict[str, Any]:
+def model(file):
     algorithms = {
         "rtp": {"type": "real_time_presence", "model": {"type": "onnx", "file": str(file)}}
     }

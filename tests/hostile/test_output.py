@@ -20,9 +20,7 @@ RUN = ("run", "--out", "out", "simulation.duration=10 min", "--seed", "4")
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
 
 
-def shell(
-    folder: Path, redirect: str, *arguments: str, **environment: str
-) -> subprocess.CompletedProcess[str]:
+def shell(folder, redirect, *arguments, **environment):
     """Run a command with its streams redirected by a shell."""
     script = f'exec "{sys.executable}" -m fleet2d.cli "$@" {redirect}'
     return subprocess.run(

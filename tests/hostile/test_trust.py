@@ -10,10 +10,8 @@ import pickle
 import py_compile
 import shutil
 import sys
-from collections.abc import Callable
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.scenes import cut_off, fleet2d_process
@@ -43,31 +41,31 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def evil(folder: Path) -> str:
+def evil(folder):
     return f"from pathlib import Path\nPath({str(folder / 'ran')!r}).touch()\n{OWN}"
 
 
 # Checkpoints
 
 
-def cut_run(out: Path, seed: int = 4, **more: Any) -> Path:
+def cut_run(out, seed=4, **more):
     """Return an unfinished run with a checkpoint of its first hour."""
     simulation = Simulation("bundled:paper", *SETTINGS, seed=seed, out=out, **more)
     simulation.run_until(4000)
     return cut_off(simulation)
 
 
-def undisturbed(directory: Path) -> str | None:
+def undisturbed(directory):
     """Return the digest of the run that a manifest describes."""
     scenario = json.loads((directory / "manifest.json").read_text())["scenario"]
     return package.run(scenario, "artifacts.checkpoint=off").digest
 
 
-def as_another_user(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+def as_another_user(monkeypatch, folder):
     monkeypatch.setenv("XDG_STATE_HOME", str(folder / "another user"))
 
 
-def forged(out: Path, command: str) -> Path:
+def forged(out, command):
     """Return a run of built-in components only, whose checkpoint starts a shell."""
     period = "algorithms.ltp.period=30 min"
     simulation = Simulation("bundled:paper", *SETTINGS, period, seed=4, out=out)
@@ -111,7 +109,7 @@ def test_the_forgery_would_run_its_command_with_the_key_of_the_user(folder):
 
 def test_a_pickle_in_place_of_a_checkpoint_is_not_read(folder, monkeypatch):
     class Calls:
-        def __reduce__(self) -> Any:
+        def __reduce__(self):
             return os.system, (f"touch {folder}/ran",)
 
     run = cut_run(folder / "run")
@@ -136,19 +134,19 @@ def test_a_checkpoint_of_this_user_is_continued(folder):
     assert undisturbed(moved) == simulation.run().digest
 
 
-def change_byte(run: Path) -> None:
+def change_byte(run):
     path = run / FOLDER / CHECKPOINT_NAME
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
 
 
-def change_seal(run: Path) -> None:
+def change_seal(run):
     path = run / FOLDER / CHECKPOINT_NAME
     path.write_bytes(path.read_bytes()[:-64] + b"0" * 64)
 
 
-def change_scenario(run: Path) -> None:
+def change_scenario(run):
     path = run / "manifest.json"
     manifest = json.loads(path.read_text())
     (name,) = manifest["entities"]["robots"][:1]
@@ -156,19 +154,19 @@ def change_scenario(run: Path) -> None:
     path.write_text(json.dumps(manifest))
 
 
-def change_seed(run: Path) -> None:
+def change_seed(run):
     path = run / "manifest.json"
     manifest = json.loads(path.read_text())
     manifest["seed"] = manifest["scenario"]["simulation"]["seed"] = 5
     path.write_text(json.dumps(manifest))
 
 
-def copy_of_another_seed(run: Path) -> None:
+def copy_of_another_seed(run):
     other = cut_run(run.with_name("other"), seed=9)
     shutil.copy(other / FOLDER / CHECKPOINT_NAME, run / FOLDER / CHECKPOINT_NAME)
 
 
-def copy_of_another_course(run: Path) -> None:
+def copy_of_another_course(run):
     """The same scenario and seed, but something was done to that run."""
     simulation = Simulation("bundled:paper", *SETTINGS, seed=4, out=run.with_name("other"))
     simulation.run_until(1000)
@@ -179,20 +177,20 @@ def copy_of_another_course(run: Path) -> None:
         shutil.copy(other / FOLDER / name, run / FOLDER / name)
 
 
-def copy_of_a_saved_simulation(run: Path) -> None:
+def copy_of_a_saved_simulation(run):
     simulation = Simulation("bundled:paper", *SETTINGS, seed=4)
     simulation.advance(100)
     simulation.save(run / FOLDER / CHECKPOINT_NAME)
 
 
-def change_journal(run: Path) -> None:
+def change_journal(run):
     path = run / FOLDER / JOURNAL_NAME
     content = bytearray(path.read_bytes())
     content[200] ^= 1
     path.write_bytes(content)
 
 
-CHANGES: dict[Callable[[Path], None], str] = {
+CHANGES = {
     change_byte: "is not signed by this user",
     change_seal: "is not signed by this user",
     change_scenario: "was written by another run",
@@ -266,7 +264,7 @@ def test_without_a_key_no_checkpoint_is_written(folder, monkeypatch, obstacle, f
 # Code beside what is listed
 
 
-def compiled(folder: Path, target: Path) -> None:
+def compiled(folder, target):
     """Write bytecode that leaves a file."""
     source = folder / "evil.txt"
     source.write_text(evil(folder))
@@ -275,7 +273,7 @@ def compiled(folder: Path, target: Path) -> None:
     source.unlink()
 
 
-PLANTS: dict[str, Callable[[Path], object]] = {
+PLANTS = {
     "source": lambda folder: (folder / "theirs.py").write_text(evil(folder)),
     "package": lambda folder: (
         (folder / "theirs").mkdir(),

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from datetime import timedelta
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +20,7 @@ OUT = {"type": "routine", "persona": "works_outside"}
 ROBOT = {"type": "patrol", "camera": {}}
 EYES = {"type": "patrol", "cameras": {"low": {}, "back": {"heading_deg": 180}}}
 
-RUNS: dict[str, dict[str, dict[str, Any]]] = {
+RUNS = {
     "prefixes": {
         "users": {"ann": OUT, "anna": OUT, "ann_lee": {"type": "meander"}},
         "robots": {"astro": ROBOT, "astro2": EYES},
@@ -36,27 +35,25 @@ RUNS: dict[str, dict[str, dict[str, Any]]] = {
     },
 }  # fmt: skip
 
-Truth = Callable[["Steps"], Bool]
-
 
 class Steps:
     """The truth of a run at each step."""
 
-    def __init__(self, run: Any) -> None:
+    def __init__(self, run):
         self.run = run
         self.rooms = {room.index: room for room in run.plan.rooms}
         table = run.tables["observations"].to_pylist()
         self.seen = [(row["robot"], row["user"], row["step"]) for row in table]
 
-    def at(self, name: str, *places: str) -> Bool:
+    def at(self, name, *places):
         path = self.run.path(name, timedelta(seconds=1))
         indices = [i for i, room in self.rooms.items() if {room.name, room.type} & set(places)]
         if "home" in places:
             indices = list(self.rooms)
-        is_there: Bool = np.isin(path.room[:STEPS], indices) & ~path.away[:STEPS]
+        is_there = np.isin(path.room[:STEPS], indices) & ~path.away[:STEPS]
         return is_there | (path.away[:STEPS] if "away" in places else False)
 
-    def sees(self, robot: str | None, user: str | None) -> Bool:
+    def sees(self, robot, user):
         """Say when robots noticed somebody; gaps of each pair of up to 6 s are none."""
         result = np.zeros(STEPS, np.bool_)
         for pair in {(r, u) for r, u, _ in self.seen}:
@@ -68,7 +65,7 @@ class Steps:
                 result[steps[i - 1] if is_near else step : step + 1] = True
         return result
 
-    def doing(self, name: str, activity: str) -> Bool:
+    def doing(self, name, activity):
         rows = self.run.tables["events"].to_pylist()
         own = [r for r in rows if r["event"] == "activity" and r["entity"] == name]
         result = np.zeros(STEPS, np.bool_)
@@ -78,54 +75,42 @@ class Steps:
         return result
 
 
-def stretches(holds: Bool) -> list[tuple[int, int]]:
+def stretches(holds):
     edges = np.diff(np.concatenate([[0], holds.astype(np.int8), [0]]))
     begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
     return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def longer(holds: Bool, seconds: float) -> Bool:
+def longer(holds, seconds):
     result = np.zeros_like(holds)
     for begin, end in stretches(holds):
         result[begin:end] = end - begin > seconds
     return result
 
 
-def within(holds: Bool, first: int, end: int) -> Bool:
+def within(holds, first, end):
     result = np.zeros_like(holds)
     result[first:end] = holds[first:end]
     return result
 
 
-QUESTIONS: dict[str, dict[str, Truth]] = {
+QUESTIONS = {
     "prefixes": {
         "ann in kitchen": lambda s: s.at("ann", "kitchen"),
-        "anna in kitchen": lambda s: s.at("anna", "kitchen"),
-        "ann_lee in living room": lambda s: s.at("ann_lee", "living_room"),
         "Ann Lee in Living_Room": lambda s: s.at("ann_lee", "living_room"),
         "ann not in bedroom": lambda s: ~s.at("ann", "bedroom"),
         "anna away": lambda s: s.at("anna", "away"),
-        "ann home": lambda s: s.at("ann", "home"),
         "ann is in the bedroom_1": lambda s: s.at("ann", "bedroom_1"),
-        "ann and anna in kitchen": lambda s: s.at("ann", "kitchen") & s.at("anna", "kitchen"),
         "ann and anna in bedroom": lambda s: s.at("ann", "bedroom") & s.at("anna", "bedroom"),
-        "ann, anna and ann lee home": lambda s: (
-            s.at("ann", "home") & s.at("anna", "home") & s.at("ann_lee", "home")
-        ),
         "ann or anna in kitchen": lambda s: s.at("ann", "kitchen") | s.at("anna", "kitchen"),
-        "ann and anna not in bedroom": lambda s: ~s.at("ann", "bedroom") & ~s.at("anna", "bedroom"),
         "ann in kitchen or bathroom": lambda s: s.at("ann", "kitchen", "bathroom"),
-        "astro in bedroom": lambda s: s.at("astro", "bedroom"),
         "ann and astro in bedroom": lambda s: s.at("ann", "bedroom") & s.at("astro", "bedroom"),
         "ann in bathroom > 3 min": lambda s: longer(s.at("ann", "bathroom"), 180),
         "seen ann": lambda s: s.sees(None, "ann"),
-        "seen anna": lambda s: s.sees(None, "anna"),
         "ann lee not seen": lambda s: ~s.sees(None, "ann_lee"),
         "seen ann by astro": lambda s: s.sees("astro", "ann"),
         "astro2 sees anna": lambda s: s.sees("astro2", "anna"),
         "seen by astro": lambda s: s.sees("astro", None),
-        "seen": lambda s: s.sees(None, None),
-        "seen ann and anna": lambda s: s.sees(None, "ann") & s.sees(None, "anna"),
         "seen ann by astro and astro2": lambda s: s.sees("astro", "ann") & s.sees("astro2", "ann"),
         "not seen ann": lambda s: ~s.sees(None, "ann"),
         "seen ann before 12 h": lambda s: within(s.sees(None, "ann"), 0, 12 * 3600),
@@ -133,48 +118,34 @@ QUESTIONS: dict[str, dict[str, Truth]] = {
             s.at("ann", "bedroom"), 20 * 3600, 26 * 3600
         ),
         "ann sleep": lambda s: s.doing("ann", "sleep"),
-        "anna sleep": lambda s: s.doing("anna", "sleep"),
     },
     "grammar": {
         "seen in kitchen": lambda s: s.at("seen", "kitchen"),
         "in in kitchen": lambda s: s.at("in", "kitchen"),
-        "in not in the kitchen": lambda s: ~s.at("in", "kitchen"),
-        "night in bedroom": lambda s: s.at("night", "bedroom"),
         '"night" in bedroom': lambda s: s.at("night", "bedroom"),
         "seen seen": lambda s: s.sees(None, "seen"),
-        "seen in": lambda s: s.sees(None, "in"),
         "seen not seen": lambda s: ~s.sees(None, "seen"),
         "seen seen by by": lambda s: s.sees("by", "seen"),
-        "seen by by": lambda s: s.sees("by", None),
         'seen by "last"': lambda s: s.sees("last", None),
         "seen and night in bedroom": lambda s: s.at("seen", "bedroom") & s.at("night", "bedroom"),
-        "seen and in home": lambda s: s.at("seen", "home") & s.at("in", "home"),
-        "by in living room": lambda s: s.at("by", "living_room"),
         '"last" in bedroom': lambda s: s.at("last", "bedroom"),
-        "seen night until 10 h": lambda s: within(s.sees(None, "night"), 0, 10 * 3600),
         "night sleep": lambda s: s.doing("night", "sleep"),
     },
     "capitals": {
         "Bob in kitchen": lambda s: s.at("Bob", "kitchen"),
         "bob in kitchen": lambda s: s.at("bob", "kitchen"),
-        "x-1 in kitchen": lambda s: s.at("x-1", "kitchen"),
         "X-1 IN KITCHEN": lambda s: s.at("x-1", "kitchen"),
         "Bob and bob home": lambda s: s.at("Bob", "home") & s.at("bob", "home"),
-        "Bob or x-1 away": lambda s: s.at("Bob", "away") | s.at("x-1", "away"),
         "seen Bob": lambda s: s.sees(None, "Bob"),
-        "seen bob": lambda s: s.sees(None, "bob"),
         "seen x-1 by r2d2": lambda s: s.sees("R2D2", "x-1"),
-        "r2d2 in bathroom": lambda s: s.at("R2D2", "bathroom"),
         "R2D2 sees Bob": lambda s: s.sees("R2D2", "Bob"),
         "R2D2 not in bathroom > 2 min": lambda s: longer(~s.at("R2D2", "bathroom"), 120),
-        "day in bedroom": lambda s: s.at("day", "bedroom"),
         "seen day": lambda s: s.sees(None, "day"),
-        "Bob sleep": lambda s: s.doing("Bob", "sleep"),
     },
 }
 
 
-def asked(page: Any, question: str) -> Any:
+def asked(page, question):
     """Ask; return the box with the answer."""
     page.fill("#ask", question)
     page.press("#ask", "Enter")

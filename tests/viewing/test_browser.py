@@ -4,11 +4,9 @@ import json
 import math
 import re
 import shutil
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +14,7 @@ from tests.thorough import THOROUGH
 
 import fleet2d
 from fleet2d.viewing.live import LiveRun
-from fleet2d.viewing.page_data import PageData, embedded_run, export_html, html_of
+from fleet2d.viewing.page_data import PageData, export_html
 from fleet2d.viewing.page_server import PageServer
 
 from .browser import page_at
@@ -38,7 +36,7 @@ def page(browser, address):
 
 
 @contextmanager
-def served(*sources: Path | PageData) -> Iterator[str]:
+def served(*sources):
     """Serve runs; yield the address of their page."""
     server = PageServer(sources)
     stop = server.start()
@@ -46,12 +44,12 @@ def served(*sources: Path | PageData) -> Iterator[str]:
     stop()
 
 
-def moment(page: Any) -> int:
+def moment(page):
     """Return the step that the page shows."""
     return int(page.get_attribute(".lanes", "aria-valuenow"))
 
 
-def until(page: Any, holds: Callable[[], bool]) -> None:
+def until(page, holds):
     """Wait for a condition; the page's policy lets no test run code in it to wait."""
     for _ in range(100):
         if holds():
@@ -60,14 +58,40 @@ def until(page: Any, holds: Callable[[], bool]) -> None:
     pytest.fail("the page did not come to it within 10 s")
 
 
-def add_new_picture(page: Any, pictures: set[bytes]) -> None:
+def go_to(page, moment):
+    page.fill("#goto", moment)
+    page.press("#goto", "Enter")
+
+
+def ask(page, question):
+    page.fill("#ask", question)
+    page.press("#ask", "Enter")
+
+
+def drag(page, first, last):
+    """Drag over the lanes, between parts of their width."""
+    box = page.locator(".lanes").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * first, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] * last, box["y"] + 60, steps=5)
+    page.mouse.up()
+
+
+def mark_range(page, first, last):
+    """Mark a range of time, between parts of the lanes' width."""
+    page.keyboard.down("Shift")
+    drag(page, first, last)
+    page.keyboard.up("Shift")
+
+
+def add_new_picture(page, pictures):
     """Wait until the plan looks like none of the pictures, and add it to them."""
     plan = page.locator(".plan canvas.top")
     until(page, lambda: plan.screenshot() not in pictures)
     pictures.add(plan.screenshot())
 
 
-def place_in(page: Any, plan: int, room: str) -> tuple[float, float]:
+def place_in(page, plan, room):
     """Return a pixel of a plan over a room, as the plan itself says."""
     box = page.locator(".plan canvas.top").nth(plan).bounding_box()
     for row in range(3, 20):
@@ -88,7 +112,7 @@ def month(tmp_path_factory):
     return folder
 
 
-def shown_step(page: Any) -> int:
+def shown_step(page):
     return int(page.get_attribute(".overview", "aria-valuenow"))
 
 
@@ -138,16 +162,16 @@ def test_click_in_the_calendar_goes_to_that_day_and_hour(browser, month):
             assert words.startswith(f"Ana: {does} · {run.clock.time(step):%a %-d %b}")
 
 
-def shown_clock(page: Any) -> str:
+def shown_clock(page):
     """Return the time and the date above the plan."""
     return page.inner_text("output.clock").replace("\n", "")
 
 
-def shows_moment(page: Any, step: int) -> None:
+def shows_moment(page, step):
     page.wait_for_selector(f".lanes[aria-valuenow='{step}']")
 
 
-def shows_step(page: Any, step: int) -> None:
+def shows_step(page, step):
     page.wait_for_selector(f"table.now[data-step='{step}']", timeout=5000)
 
 
@@ -156,8 +180,7 @@ def test_what_is_shown_at_random_moments_is_what_the_tables_say(page, run_dir):
     paths = {name: run.path(name, timedelta(seconds=1)) for name in ("ana", "astro")}
     count = 100 if THOROUGH else 12
     for step in np.random.default_rng(5).choice(run.manifest["steps"], count).tolist():
-        page.fill("#goto", f"step {step}")
-        page.press("#goto", "Enter")
+        go_to(page, f"step {step}")
         shows_step(page, step)
         for name, path in paths.items():
             row = page.locator(f"tr[data-body={name}]")
@@ -170,13 +193,12 @@ def test_what_is_shown_at_random_moments_is_what_the_tables_say(page, run_dir):
 def test_observations_at_a_moment_are_those_of_the_table(page, run_dir):
     table = fleet2d.open_run(run_dir).tables["observations"]
     step = table["step"].to_pylist()[len(table) // 2]
-    page.fill("#goto", f"step {step}")
-    page.press("#goto", "Enter")
+    go_to(page, f"step {step}")
     shows_step(page, step)
     page.wait_for_selector("tr[data-body=astro] >> text=sees ana", timeout=5000)
 
 
-def shares_are(page: Any, believed: dict[str, float]) -> bool:
+def shares_are(page, believed):
     """Say whether every bar shows what is believed of its room."""
     bars = page.locator("table.bars tr[data-room]")  # read at once: they may be replaced between
     pairs = bars.evaluate_all("rows => rows.map(row => [row.dataset.room, row.dataset.believed])")
@@ -185,21 +207,7 @@ def shares_are(page: Any, believed: dict[str, float]) -> bool:
     return shown == pytest.approx(expected, abs=1e-9) and bool(shown or not believed)
 
 
-def test_beliefs_are_those_of_the_table(page, run_dir):
-    run = fleet2d.open_run(run_dir)
-    table = run.tables["ltp"].to_pylist()
-    steps = np.random.default_rng(5).choice(run.manifest["steps"], 100 if THOROUGH else 4).tolist()
-    page.click("#tab-beliefs")
-    for step in [*steps, run.manifest["steps"] - 1]:
-        page.fill("#goto", f"step {step}")
-        page.press("#goto", "Enter")
-        shows_moment(page, step)
-        last = max((row["step"] for row in table if row["step"] <= step), default=-1)
-        rows = [row for row in table if row["step"] == last and row["user"] == "ana"]
-        until(page, lambda: shares_are(page, with_away(rows)))  # noqa: B023
-
-
-def with_away(rows: list[dict[str, Any]]) -> dict[str, float]:
+def with_away(rows):
     """Return shares of rooms and of away that sum to one; those of rooms are stored given home."""
     shares = {row["room"]: row["share"] for row in rows}
     away = shares.get("away", 0.0)
@@ -234,8 +242,7 @@ def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(browser, tmp_p
                     assert 1 == pytest.approx(sum(shares.values()))
                 page.select_option("#panel select", f"{algorithm}/{user}")
                 for step in draw.integers(moments[0], 86_400, 4).tolist():
-                    page.fill("#goto", f"step {step}")
-                    page.press("#goto", "Enter")
+                    go_to(page, f"step {step}")
                     shows_moment(page, step)
                     last = max(moment for moment in moments if moment <= step)
                     of = [r for r in rows if r[column] == last and r["user"] == user]
@@ -249,11 +256,7 @@ def test_beliefs_and_truths_sum_to_100_percent_and_say_their_time(browser, tmp_p
 
 
 def test_dragging_over_the_timeline_scrubs(page):
-    box = page.locator(".lanes").bounding_box()
-    page.mouse.move(box["x"] + box["width"] * 0.25, box["y"] + 60)
-    page.mouse.down()
-    page.mouse.move(box["x"] + box["width"] * 0.75, box["y"] + 60, steps=5)
-    page.mouse.up()
+    drag(page, 0.25, 0.75)
     until(page, lambda: 0.75 * 9 * 3600 == pytest.approx(moment(page), rel=0.01))
 
 
@@ -273,9 +276,9 @@ def test_panels_keep_up_with_the_timeline_while_an_hour_passes_in_a_second(page)
     page.click("button.play")
     shown = """[document.querySelector('.lanes').ariaValueNow,
                 document.querySelector('table.now').dataset.step]"""
-    pairs: list[tuple[str, str]] = []
+    pairs = []
 
-    def has_seen_six_moments() -> bool:
+    def has_seen_six_moments():
         pairs.append(tuple(page.evaluate(shown)))
         return len(set(pairs)) > 5
 
@@ -327,18 +330,6 @@ def test_events_are_filtered_searched_and_jumped_to(page, run_dir):
     shows_moment(page, activities[0]["step"])
 
 
-def test_last_sighting_before_a_time_is_one_question(page, run_dir):
-    stored = fleet2d.open_run(run_dir).tables["observations"].to_pylist()
-    before = 8 * 3600
-    seen = [row["step"] for row in stored if row["user"] == "ana" and row["step"] < before]
-    first = max(step for step in seen if step - 1 not in seen)  # of the last stretch
-    page.keyboard.press("a")
-    page.keyboard.type("last seen ana before 8 h")
-    page.keyboard.press("Enter")
-    page.wait_for_selector("#ask-answer[data-count='1']")
-    shows_moment(page, first)
-
-
 AT_HOME = [
     {"at": "07:30", "place": ["living_room", "any"]},
     {"at": "22:00", "place": "bedroom", "activity": "sleep"},
@@ -353,74 +344,67 @@ DAYS = [
 class Tasks:
     """What people come to the page for; an action is a click, a drag, a key, or a line sent."""
 
-    def __init__(self, page: Any) -> None:
+    def __init__(self, page):
         self.page, self.actions = page, 0
 
-    def ask(self, question: str, answer: str = "") -> None:
+    def ask(self, question, answer=""):
         self.actions += 1
-        self.page.fill("#ask", question)
-        self.page.press("#ask", "Enter")
+        ask(self.page, question)
         self.page.wait_for_selector("#ask-answer[data-count]")
         until(self.page, lambda: answer in self.page.inner_text("#ask-answer"))
 
-    def press(self, key: str) -> None:
+    def press(self, key):
         self.actions += 1
         self.page.evaluate("document.activeElement.blur()")
         self.page.keyboard.press(key)
 
-    def click(self, selector: str) -> None:
+    def click(self, selector):
         self.actions += 1
         self.page.click(selector)
 
-    def last_sight_of_somebody_before_a_time(self) -> None:
+    def last_sight_of_somebody_before_a_time(self):
         self.ask("last seen ana before day 2 18:00")
 
-    def first_night_away(self) -> None:
+    def first_night_away(self):
         self.ask("first night ana away")
         evening, night = 86_400 + 20 * 3600, 86_400 + 23 * 3600
         until(self.page, lambda: evening <= moment(self.page) <= night)
 
-    def where_somebody_was(self) -> None:
+    def where_somebody_was(self):
         self.ask("astro at day 2 12:00", answer="Astro is in")
 
-    def who_was_in_a_room(self) -> None:
+    def who_was_in_a_room(self):
         self.ask("living_room at day 2 12:00", answer="Ana")
 
-    def beliefs_over_time(self) -> None:
+    def beliefs_over_time(self):
         self.press("3")
         self.page.wait_for_selector(".label >> text=ltp of ana")
 
-    def column_of_a_table(self) -> None:
+    def column_of_a_table(self):
         self.press("5")
         self.actions += 1
         self.page.select_option("[aria-label='Column to plot']", "key_frames.x")
         self.page.wait_for_selector("[aria-label='x of key_frames over the run'] canvas")
 
-    def reason_of_a_decision(self) -> None:
+    def reason_of_a_decision(self):
         self.click(".label .name >> text=/^Astro$/")
         self.page.wait_for_selector("[data-inspected=astro] dt >> text=behavior")
 
-    def follow_a_body(self) -> None:
+    def follow_a_body(self):
         self.click(".label .name >> text=/^Ana$/")
         self.press("c")
         self.page.wait_for_selector("text=Follow no longer")
 
-    def next_failure(self) -> None:
+    def next_failure(self):
         self.press("v")
         self.page.wait_for_selector(".lanes:not([aria-valuenow='0'])")
 
-    def totals_of_a_range(self) -> None:
+    def totals_of_a_range(self):
         self.actions += 1
-        box = self.page.locator(".lanes").bounding_box()
-        self.page.keyboard.down("Shift")
-        self.page.mouse.move(box["x"] + 100, box["y"] + 60)
-        self.page.mouse.down()
-        self.page.mouse.move(box["x"] + 300, box["y"] + 60, steps=3)
-        self.page.mouse.up()
-        self.page.keyboard.up("Shift")
+        mark_range(self.page, 0.1, 0.3)
         self.page.wait_for_selector(".totals dt >> text=ana")
 
-    def another_future(self) -> None:
+    def another_future(self):
         self.click("text=Continue from here")
         self.page.wait_for_selector(".live[data-paused=true]", timeout=20_000)
 
@@ -445,8 +429,7 @@ def test_each_task_takes_one_or_two_actions(browser):
 
 
 def test_address_holds_the_moment_and_the_view(browser, page):
-    page.fill("#goto", "day 1 05:00")
-    page.press("#goto", "Enter")
+    go_to(page, "day 1 05:00")
     page.click("#tab-layers")
     page.uncheck("input[name=ways]")
     page.keyboard.press("+")
@@ -463,8 +446,7 @@ def test_note_at_a_moment_is_kept_and_found_again(browser, run_dir, tmp_path):
     root = shutil.copytree(run_dir, tmp_path / "day")
     with served(root) as address:
         with page_at(browser, address) as page:
-            page.fill("#goto", "step 7200")
-            page.press("#goto", "Enter")
+            go_to(page, "step 7200")
             page.keyboard.press("b")
             page.wait_for_selector("#note:focus")
             page.keyboard.type("waits here")
@@ -480,25 +462,10 @@ def test_note_at_a_moment_is_kept_and_found_again(browser, run_dir, tmp_path):
 
 
 @pytest.mark.slow
-def test_link_to_a_moment_is_copied(browser, address):
-    permissions = ["clipboard-read", "clipboard-write"]
-    with page_at(browser, address, permissions=permissions) as page:
-        page.fill("#goto", "day 1 05:00")
-        page.press("#goto", "Enter")
-        page.click("text=Copy link")
-        page.wait_for_selector("text=Copied")
-        link = page.evaluate("navigator.clipboard.readText()")
-    assert "at=2026-01-05T05%3A00%3A00" in link
-    with page_at(browser, link) as page:
-        shows_moment(page, 5 * 3600)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("zone", ["Pacific/Auckland", "America/Los_Angeles", "Asia/Kathmandu"])
 def test_times_are_the_home_s_in_every_time_zone(browser, address, zone):
     with page_at(browser, f"{address}#panel=metrics", timezone_id=zone) as page:
-        page.fill("#goto", "Mon 5 Jan 08:30")
-        page.press("#goto", "Enter")
+        go_to(page, "Mon 5 Jan 08:30")
         shows_moment(page, 8 * 3600 + 1800)
         assert "Mon 5 Jan 08:30:00" in page.get_attribute(".lanes", "aria-valuetext")
         until(page, lambda: "at=2026-01-05T08%3A30%3A00" in page.url)
@@ -524,20 +491,14 @@ def test_lanes_fold_are_pinned_hidden_and_filtered(page):
     until(page, lambda: ["Astro", "Users (1)", "Ana does"] == labels.all_inner_texts())
 
 
-def seconds_in(words: str) -> int:
+def seconds_in(words):
     """Return the sum of all durations in a text."""
     units = {"h": 3600, "min": 60, "s": 1}
     return sum(int(n) * units[u] for n, u in re.findall(r"(?<!_)\b(\d+) (h|min|s)\b", words))
 
 
 def test_marked_range_has_totals_that_fill_it(page):
-    box = page.locator(".lanes").bounding_box()
-    page.keyboard.down("Shift")
-    page.mouse.move(box["x"] + box["width"] / 3, box["y"] + 60)
-    page.mouse.down()
-    page.mouse.move(box["x"] + box["width"] * 2 / 3, box["y"] + 60, steps=3)
-    page.mouse.up()
-    page.keyboard.up("Shift")
+    mark_range(page, 1 / 3, 2 / 3)
     dwelt = page.locator(".totals div:has(dt:text-is('Ana')) dd")
     until(page, lambda: 3 * 3600 == pytest.approx(seconds_in(dwelt.inner_text()), abs=120))
     page.keyboard.press("Escape")
@@ -558,7 +519,7 @@ def test_body_is_followed_and_pointed_at(page):
     page.click("text=Follow ana")
     name = page.locator(".plan .hover >> text=ana")
 
-    def pointed_at_is_ana() -> bool:
+    def pointed_at_is_ana():
         box = page.locator(".plan canvas.top").bounding_box()
         x, y = box["x"] + box["width"] / 2, box["y"] + (box["height"] - 18) / 2
         page.mouse.move(x - 1, y)
@@ -568,12 +529,6 @@ def test_body_is_followed_and_pointed_at(page):
     until(page, pointed_at_is_ana)
     page.keyboard.press("c")
     page.wait_for_selector("text=Follow ana")
-
-
-def test_any_column_of_a_table_is_plotted(page):
-    page.click("#tab-metrics")
-    page.select_option("[aria-label='Column to plot']", "key_frames.x")
-    page.wait_for_selector("[aria-label='x of key_frames over the run'] canvas")
 
 
 def test_layers_and_switches_change_the_plan(page):
@@ -603,8 +558,7 @@ def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(browser, tmp
         for seconds in (4 * 3600 + 37, 6 * 3600 + 59, 7 * 3600 + 12):
             step = seconds // 60
             moment = f"{run.clock.time(step):%a %-d %b %H:%M:%S}"
-            page.fill("#goto", f"{seconds} s")
-            page.press("#goto", "Enter")
+            go_to(page, f"{seconds} s")
             shows_moment(page, step)
             page.click("#tab-now")
             date, time = moment[:-9], moment[-8:]
@@ -629,8 +583,7 @@ def test_decision_behind_what_a_robot_does_is_shown(page, run_dir):
     page.click("tr[data-body=astro] button")
     events = fleet2d.open_run(run_dir).tables["events"].to_pylist()
     explores = next(row for row in events if row["event"] == "explores")
-    page.fill("#goto", f"step {explores['step'] + 60}")
-    page.press("#goto", "Enter")
+    go_to(page, f"step {explores['step'] + 60}")
     inspected = page.locator("[data-inspected=astro]")
     inspected.locator("div:has(dt:text-is('behavior')) >> text=hangout").wait_for()
     room = explores["detail"].replace("_", " ")
@@ -687,11 +640,6 @@ def test_violation_is_the_first_thing_on_the_page_and_a_click_goes_there(browser
         assert alarm != note.evaluate("element => getComputedStyle(element).color")
 
 
-def test_page_of_a_run_without_expectations_has_no_alarm(page):
-    assert 0 == page.locator(".violated, .status").count()
-    assert 0 == page.locator(".verdict").count()
-
-
 @pytest.mark.slow
 def test_one_key_stores_a_film_of_the_minute_around_a_failure(browser, tmp_path):
     av = pytest.importorskip("av", reason="PyAV is not installed")
@@ -717,8 +665,7 @@ def test_two_runs_are_compared_in_step(browser, run_dir, other_dir):
     with served(run_dir, other_dir) as address, page_at(browser, address) as page:
         until(page, lambda: page.locator(".plan canvas.top").count() == 2)
         page.wait_for_selector(".labels button >> text=rooms differ")
-        page.fill("#goto", "day 1 08:00")
-        page.press("#goto", "Enter")
+        go_to(page, "day 1 08:00")
         until(page, lambda: 2 == page.locator(f"table.now[data-step='{8 * 3600}']").count())
         page.click("#tab-metrics")
         page.locator("table.results tr.differs").first.wait_for()
@@ -741,17 +688,6 @@ def test_exported_file_plays_without_a_server(browser, run_dir, tmp_path):
         assert path.x[3 * 3600 - 1] == pytest.approx(x, abs=1e-9)
         page.keyboard.press("Home")
         shows_step(page, 3600)
-
-
-@pytest.mark.slow
-def test_fifty_users_are_shown(browser, tmp_path):
-    people = {f"u{i:02d}": {"type": "routine", "persona": "works_outside"} for i in range(50)}
-    run = fleet2d.run("bundled:paper", "simulation.duration=1 h", seed=4, users=people)
-    with served(PageData(run)) as address, page_at(browser, address) as page:
-        page.keyboard.press("End")
-        until(page, lambda: page.locator("table.now tr[data-body]").count() == 52)
-        page.click("tr[data-body=u49] button")
-        page.wait_for_selector("[data-inspected=u49]")
 
 
 @pytest.mark.slow
@@ -831,8 +767,7 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(browser, run_di
     with served(parent) as address:
         at = 4 * 3600
         with page_at(browser, address) as page:
-            page.fill("#goto", f"step {at}")
-            page.press("#goto", "Enter")
+            go_to(page, f"step {at}")
             page.click("text=Continue from here")
             page.wait_for_selector(f".live[data-paused=true][data-step='{at}']")
             tables = [page.locator(f"table.now[data-step='{at}']").nth(i) for i in range(2)]
@@ -863,23 +798,6 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(browser, run_di
     done = fleet2d.open_run(branch).manifest["interventions"]
     assert [("configure", at), ("send", at)] == [(act["do"], act["step"]) for act in done]
     assert fleet2d.reproduce(branch).same
-
-
-def test_page_works_in_the_frame_of_a_notebook(browser, run_dir):
-    """Jupyter and marimo show the page in a frame that may run scripts, and nothing else."""
-    document = html_of([embedded_run(PageData(fleet2d.open_run(run_dir)), 0, 9 * 3600)])
-    page = browser.new_page()
-    page.set_content('<iframe sandbox="allow-scripts" width="1000" height="800"></iframe>')
-    page.eval_on_selector("iframe", "(frame, text) => { frame.srcdoc = text; }", document)
-    frame = page.frame_locator("iframe")
-    for number, press in enumerate(("Enter", "Go"), start=4):
-        frame.locator("#goto").fill(f"day 1 0{number}:00")
-        if press == "Go":
-            frame.get_by_role("button", name="Go", exact=True).click()
-        else:
-            frame.locator("#goto").press(press)
-        frame.locator(f"table.now[data-step='{number * 3600}']").wait_for(timeout=20_000)
-    page.close()
 
 
 @pytest.mark.slow

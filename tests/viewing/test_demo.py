@@ -3,7 +3,6 @@
 import re
 import sys
 from collections import Counter
-from typing import Any
 
 import numpy as np
 import pytest
@@ -156,7 +155,7 @@ def test_demo_without_the_extra_says_how_to_get_it(fleet2d, monkeypatch):
 
 @pytest.mark.usefixtures("short")
 def test_demo_shows_the_page_of_its_run_in_a_new_folder(fleet2d, monkeypatch):
-    shown: list[Any] = []
+    shown = []
     monkeypatch.setattr("fleet2d.viewing.command.view", shown.append)
 
     code, out, _ = fleet2d("demo")

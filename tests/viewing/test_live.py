@@ -37,63 +37,37 @@ def live():
     watched.end()
 
 
-def test_watched_run_has_the_digest_of_one_that_nobody_watches():
-    watched = LiveRun(simulation())
-    frames = watched.frames()
+def frames_of(watched):
+    """Let a run go on to its end; return its frames."""
+    batches = watched.frames()
     watched.start()
-    steps = []
-    for batch in frames:
-        steps += [frame["step"] for frame in batch]
-        if batch and batch[-1]["done"]:
+    watched.submit(order("resume"))
+    frames = []
+    for batch in batches:
+        frames += batch
+        if frames and frames[-1]["done"]:
             break
     watched.end()
-    assert watched.run is not None
+    return frames
+
+
+def test_watched_run_has_the_digest_of_one_that_nobody_watches_and_frames_its_events_once():
+    watched = LiveRun(simulation())
+    frames = frames_of(watched)
+    steps = [frame["step"] for frame in frames]
     assert simulation().run().digest == watched.run.digest
     assert steps == sorted(steps)
     assert len(steps) > 8 * 60 * 0.9
     assert [] == watched.run.notes
-
-
-def test_frames_have_every_event_once():
-    watched = LiveRun(simulation())
-    frames = watched.frames()
-    next(frames)
-    watched.start()
-    events = []
-    for batch in frames:
-        events += [(e["step"], e["entity"], e["event"]) for f in batch for e in f["events"]]
-        if batch and batch[-1]["done"]:
-            break
-    watched.end()
-    assert watched.run is not None
+    events = [(e["step"], e["entity"], e["event"]) for frame in frames for e in frame["events"]]
     rows = watched.run.tables["events"].to_pylist()
     assert sorted((r["step"], r["entity"], r["event"]) for r in rows) == sorted(events)
-
-
-def test_frames_have_every_intervention_once(live):
-    frames = live.frames()
-    next(frames)
-    live.submit(order("step", value=300))
-    for command in (order("door", "bath_door", value=0), order("replan", "astro")):
-        assert "" == live.submit(command)
-    live.submit(order("step", value=5))
-    marks = [mark for frame in next(frames) for mark in frame["marks"]]
-    assert [(300, "shut bath_door"), (300, "replan astro")] == [
-        (mark["step"], mark["label"]) for mark in marks
-    ]
 
 
 def test_beliefs_in_frames_sum_to_one_and_are_of_everybody():
     own = "algorithms.share={type: 'tests.own_components:Share'}"
     watched = LiveRun(fleet2d.Simulation("bundled:paper", "simulation.duration=13 h", own, seed=4))
-    frames = watched.frames()
-    watched.start()
-    beliefs = []
-    for batch in frames:
-        beliefs += [frame["beliefs"] for frame in batch if frame["beliefs"]]
-        if batch and batch[-1]["done"]:
-            break
-    watched.end()
+    beliefs = [frame["beliefs"] for frame in frames_of(watched) if frame["beliefs"]]
     assert {"ana", "anyone"} == set(beliefs[-1]["ltp"])
     assert {"ana"} == set(beliefs[-1]["share"])
     sums = [sum(s) for each in beliefs for users in each.values() for s in users.values()]
@@ -110,7 +84,6 @@ def test_body_is_put_somewhere_and_the_run_says_so(live):
     state = live.engine.simulation.state["ana"]
     assert (x, y) == pytest.approx((state["x"], state["y"]), abs=1.5)
     live.end()
-    assert live.run is not None
     assert ["put"] == [entry["do"] for entry in live.run.manifest["interventions"]]
     path = live.run.path("ana", timedelta(seconds=1))
     assert len(path.x) == live.run.manifest["steps"]
@@ -126,7 +99,6 @@ def test_robot_that_is_called_comes_and_stays(live):
     assert "" == live.submit(order("call", "astro", x=x + 0.5, y=y))
     live.submit(order("step", value=1))
     live.end()
-    assert live.run is not None
     actions = [entry["do"] for entry in live.run.manifest["interventions"]]
     assert ["send", "send"] == actions
 
@@ -141,16 +113,12 @@ def test_steered_run_is_reproduced_from_its_manifest(tmp_path):
     watched.submit(order("step", value=300))
     for command in (order("door", "bath_door", value=0), order("replan", "astro")):
         assert "" == watched.submit(command)
-    watched.submit(order("resume"))
-    for batch in watched.frames():
-        if batch and batch[-1]["done"]:
-            break
-    watched.end()
+    marks = [mark for frame in frames_of(watched) for mark in frame["marks"]]
     assert fleet2d.reproduce(run_dir).same
-    marks = PageData(fleet2d.open_run(run_dir)).facts["marks"]
-    assert [(300, "shut bath_door"), (300, "replan astro")] == [
-        (mark["step"], mark["label"]) for mark in marks
-    ]
+    for found in (marks, PageData(fleet2d.open_run(run_dir)).facts["marks"]):
+        assert [(300, "shut bath_door"), (300, "replan astro")] == [
+            (mark["step"], mark["label"]) for mark in found
+        ]
 
 
 def test_door_is_shut_from_the_next_step_on(live):
@@ -193,9 +161,13 @@ def test_what_is_no_order_is_refused(body):
         read_body(body, LIVE_ORDER, "it is not a valid order")
 
 
-def test_orders_need_the_page_s_origin_and_json(live):
+@pytest.fixture
+def client(live):
     served = ServedRuns([])
-    client = TestClient(page_app(served, "token", PORT, LiveRuns(served, live)), base_url=OWN)
+    return TestClient(page_app(served, "token", PORT, LiveRuns(served, live)), base_url=OWN)
+
+
+def test_orders_need_the_page_s_origin_and_json(live, client):
     body = json.dumps(order("step", value=1))
     own_headers = {"Origin": OWN, "Content-Type": "application/json"}
     for wrong in (
@@ -213,9 +185,7 @@ def test_orders_need_the_page_s_origin_and_json(live):
     assert 1 == live.engine.simulation.step
 
 
-def test_facts_of_a_run_under_way_name_home_and_bodies(live):
-    served = ServedRuns([])
-    client = TestClient(page_app(served, "token", PORT, LiveRuns(served, live)), base_url=OWN)
+def test_facts_of_a_run_under_way_name_home_and_bodies(client):
     facts = client.get("/token/live/0/facts.json").json()
     assert ["ana", "astro"] == [body["name"] for body in facts["bodies"]]
     assert ["bath_door"] == [door["name"] for door in facts["home"]["doors"]]

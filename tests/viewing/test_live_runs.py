@@ -36,7 +36,7 @@ def lives(served):
     lives.end_branches()
 
 
-def order(action: str, target: str = "", value: float = 0, **more: str) -> LiveOrder:
+def order(action, target="", value=0, **more):
     blank = {"x": 0.0, "y": 0.0, "key": "", "text": ""}
     return LiveOrder(**{**blank, "action": action, "target": target, "value": value, **more})  # type: ignore[typeddict-item]
 

@@ -1,6 +1,5 @@
 """The light of the hour in Python's pictures: as the page's."""
 
-from collections.abc import Sequence
 from datetime import datetime
 from functools import cache
 
@@ -17,11 +16,11 @@ HOUR = 3600
 
 
 @cache
-def evening() -> fleet2d.Run:
+def evening():
     return fleet2d.run("bundled:paper", "simulation.duration=1 d", seed=4)
 
 
-def opacity_of_rooms(run: fleet2d.Run, step: int) -> dict[str, float]:
+def opacity_of_rooms(run, step):
     """How dark the light is that lies on each room at a step."""
     stage = Stage(run, 0, run.manifest["steps"], figure=Figure(), stride=60)
     stage.show(step)
@@ -33,11 +32,11 @@ def opacity_of_rooms(run: fleet2d.Run, step: int) -> dict[str, float]:
     return {room.name: float(veil[plan.room_of_cell == room.index, 3].max()) for room in plan.rooms}
 
 
-def room_of(run: fleet2d.Run, name: str, step: int) -> str:
+def room_of(run, name, step):
     return str(run.plan.rooms[run.path(name).room[step // 60]].name)
 
 
-def steps_of(run: fleet2d.Run, activity: str) -> Sequence[int]:
+def steps_of(run, activity):
     rows = run.tables["events"].to_pylist()
     return [r["step"] for r in rows if r["event"] == "activity" and r["detail"] == activity]
 

@@ -6,8 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -20,11 +18,10 @@ from fleet2d.viewing.page_data import PageData, embedded_run, export_html, html_
 DATA = re.compile(r'<script type="application/json" id="fleet2d-runs">(.*?)</script>', re.DOTALL)
 
 
-def runs_in(path: Path) -> list[dict[str, Any]]:
+def runs_in(path):
     match = DATA.search(path.read_text(encoding="utf-8"))
     assert match
-    runs: list[dict[str, Any]] = json.loads(match[1])
-    return runs
+    return json.loads(match[1])
 
 
 def test_file_holds_the_run_and_loads_nothing(run_dir, tmp_path):

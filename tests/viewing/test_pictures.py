@@ -7,7 +7,6 @@ views with `FLEET2D_THOROUGH=1`: look at each before it is committed.
 import io
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -45,7 +44,7 @@ def addresses(run_dir, other_dir):
         stop()
 
 
-def picture_of(page: Any) -> np.ndarray:
+def picture_of(page):
     with Image.open(io.BytesIO(page.screenshot())) as image:
         small = image.convert("RGB").resize(
             (SIZE["width"] // SMALLER, SIZE["height"] // SMALLER), Image.Resampling.BOX

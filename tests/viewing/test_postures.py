@@ -3,7 +3,6 @@
 from collections import Counter
 from datetime import datetime
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -38,7 +37,7 @@ def test_postures_are_the_true_ones_wherever_there_is_furniture_for_them(run):
     rests = np.array(
         [(u.x, u.y) for item in run.plan.objects for u in item.uses if u.posture != "stand"]
     )
-    pairs: Counter[tuple[str, str]] = Counter()
+    pairs = Counter()
     for row in run.tables["observations"].to_pylist():
         derived = postures.at(row["true_user"], row["step"] * step_us)
         posture = "stand" if derived is None else derived["posture"]
@@ -56,7 +55,7 @@ def test_postures_are_the_true_ones_wherever_there_is_furniture_for_them(run):
 def test_postures_are_in_order_and_within_the_run(run):
     table = postures_of(run, run.plan)
     end = run.manifest["steps"] * run.manifest["step_us"]
-    last: dict[str, int] = {}
+    last = {}
     for row in table.to_pylist():
         assert last.get(row["user"], 0) <= row["time_us"] < row["end_us"] <= end
         assert row["posture"] in ("sit", "lie")
@@ -76,9 +75,9 @@ def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then():
     }  # fmt: skip
     frames = pa.table({**columns, "step": pa.array(step, pa.int64()), "time": time})
     clock = Clock(datetime(2026, 1, 5), step_us=1_000_000, steps=100)
-    run: Any = SimpleNamespace(tables={"key_frames": frames}, manifest=manifest, clock=clock)
+    run = SimpleNamespace(tables={"key_frames": frames}, manifest=manifest, clock=clock)
     chair = SimpleNamespace(name="chair", uses=[UsePlace(x=2, y=1, heading=0, posture="sit")])
-    plan: Any = SimpleNamespace(objects=[chair])
+    plan = SimpleNamespace(objects=[chair])
 
     table = postures_of(run, plan)
 
@@ -111,7 +110,7 @@ def test_people_sit_at_the_same_steps_in_a_home_with_a_time_zone(tmp_path):
 def test_without_furniture_people_or_key_frames_nobody_sits(scenario, tmp_path):
     scenario["simulation"] = {**HOME["simulation"], "duration": "10 min"}
     run = fleet2d.run(scenario, out=tmp_path / "run")
-    table: pa.Table = postures_of(run, run.plan)
+    table = postures_of(run, run.plan)
     if scenario["floorplan"].get("furnish"):
         assert table.num_rows == 0
     assert table.column_names[:3] == ["step", "time_us", "end_us"]

@@ -1,7 +1,5 @@
 """What robots asked whom, and what came of it, as a film tells it."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -11,7 +9,7 @@ import fleet2d
 from fleet2d.viewing.stage import Stage, asked_of
 
 
-def run_with(outcomes: tuple[str, ...], **changes: Any) -> fleet2d.Run:
+def run_with(outcomes, **changes):
     metrics = {"interactions": {"period": "1 h"}}
     return fleet2d.run(
         home("2 h", users={"ana": ana(outcomes=outcomes)}, metrics=metrics, **changes)
@@ -53,7 +51,7 @@ def test_a_film_says_what_is_asked_and_answered_beside_the_robot():
     stage = Stage(run, talk.step - 60, talk.step + 120, figure=Figure())
     robot = next(body for body in stage.bodies if body.facts["name"] == "astro")
 
-    def shown(step: int) -> str:
+    def shown(step):
         stage.show(step)
         return str(robot.name.get_text())
 

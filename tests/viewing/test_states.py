@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from typing import Any
 from urllib.request import Request, urlopen
 
 import pytest
@@ -12,7 +11,7 @@ from fleet2d.viewing.page_data import export_html
 from fleet2d.viewing.page_server import PageServer
 
 from .browser import page_at
-from .test_browser import AXE, served, shown_clock, shown_step, until
+from .test_browser import AXE, ask, go_to, mark_range, served, shown_clock, shown_step, until
 
 START = {"start": "2026-01-05", "duration": "2 d", "seed": 1}
 HOME = {"simulation": START, "floorplan": {"type": "bundled"}}
@@ -23,7 +22,7 @@ PAPER = {"extends": "bundled:paper"}
 LATE = {"duration": "2 d", "start": "2026-01-05T14:37:00", "seed": 1}
 
 
-STATES: dict[str, tuple[dict[str, Any], str, str]] = {
+STATES = {
     "nobody": ({**HOME, "robots": {"astro": PATROL}}, "#view=calendar", "Nobody lives here"),
     "empty": (HOME, "#", "Nobody is in this home, neither people nor robots"),
     "no robots": ({**HOME, **ANA}, "#view=calendar", "Bedroom"),
@@ -52,11 +51,9 @@ def test_run_that_starts_at_any_minute_keeps_its_clock(browser, tmp_path):
     fleet2d.run({**PAPER, "simulation": LATE}, out=tmp_path / "run")
     with served(tmp_path / "run") as address, page_at(browser, f"{address}#view=calendar") as page:
         assert shown_clock(page).startswith("14:37:00Mon 5 Jan")
-        page.fill("#goto", "day 2 00:00")
-        page.press("#goto", "Enter")
+        go_to(page, "day 2 00:00")
         until(page, lambda: shown_step(page) == (9 * 60 + 23) * 60)
-        page.fill("#goto", "day 9 00:00")
-        page.press("#goto", "Enter")
+        go_to(page, "day 9 00:00")
         page.wait_for_selector("text=No time of this run, which lasts from Mon 5 Jan 14:37")
 
 
@@ -128,11 +125,9 @@ def test_palette_asks_goes_and_does(browser, run_dir):
         page.keyboard.press("Enter")
         until(page, lambda: shown_step(page) > step)
         theme = page.get_attribute("html", "data-theme")
-        page.fill("#ask", "light or dark")
-        page.press("#ask", "Enter")
+        ask(page, "light or dark")
         until(page, lambda: page.get_attribute("html", "data-theme") != theme)
-        page.fill("#ask", "where is anna")
-        page.press("#ask", "Enter")
+        ask(page, "where is anna")
         page.click("#palette >> text=where is ana")
         until(
             page,
@@ -146,19 +141,12 @@ def test_palette_asks_goes_and_does(browser, run_dir):
 @pytest.mark.slow
 def test_link_keeps_question_marked_range_and_pinned_lanes(browser, run_dir):
     with served(run_dir) as address, page_at(browser, address) as page:
-        page.fill("#ask", "ana in bathroom")
-        page.press("#ask", "Enter")
+        ask(page, "ana in bathroom")
         count = page.get_attribute("#ask-answer", "data-count")
         page.keyboard.press("Escape")
         page.locator(".label", has_text="astro").first.hover()
         page.click("[aria-label='Pin Astro']")
-        box = page.locator(".lanes").bounding_box()
-        page.keyboard.down("Shift")
-        page.mouse.move(box["x"] + 100, box["y"] + 60)
-        page.mouse.down()
-        page.mouse.move(box["x"] + 300, box["y"] + 60, steps=3)
-        page.mouse.up()
-        page.keyboard.up("Shift")
+        mark_range(page, 0.1, 0.3)
         totals = page.inner_text(".totals strong")
         until(page, lambda: "marked=" in page.url and "pin=" in page.url and "ask=" in page.url)
         with page_at(browser, page.url) as other:
@@ -215,7 +203,7 @@ def test_popovers_are_inside_the_window(browser, run_dir):
         assert is_inside(page, ".palette")
 
 
-def is_inside(page: Any, selector: str) -> bool:
+def is_inside(page, selector):
     box = page.locator(selector).bounding_box()
     right, bottom = box["x"] + box["width"], box["y"] + box["height"]
     return box["x"] >= 0 and box["y"] >= 0 and right <= 900 and bottom <= 480
@@ -276,8 +264,10 @@ def test_file_and_cell_of_a_notebook_look_as_the_served_page(browser, run_dir, t
         page.eval_on_selector("iframe", "(frame, text) => { frame.srcdoc = text; }", text)
         frame = page.frames[-1]
         frame.wait_for_selector("html[data-ready=true]")
+        go_to(frame, "day 1 05:00")
+        frame.wait_for_selector(f"table.now[data-step='{5 * 3600}']")
         frame.fill("#goto", "day 1 07:30")
-        frame.press("#goto", "Enter")
+        frame.get_by_role("button", name="Go", exact=True).click()
         frame.get_by_role("button", name="Lanes", exact=True).click()
         page.wait_for_timeout(500)
         looks.append(frame.evaluate(PIXELS))
@@ -305,32 +295,30 @@ def test_two_runs_have_a_table_of_what_differs(browser, run_dir, other_dir):
         page.wait_for_selector(".differences >> text=Nothing does")
 
 
-def open_palette(page: Any) -> None:
+def open_palette(page):
     page.keyboard.press("Control+k")
     page.keyboard.type("how long was ana in the bathroom")
     page.keyboard.press("Enter")
     page.wait_for_selector("#palette [role=option] canvas")
 
 
-def open_menu(page: Any) -> None:
+def open_menu(page):
     page.click(".menu summary")
 
 
-def play_reel(page: Any) -> None:
+def play_reel(page):
     page.keyboard.press("r")
     page.wait_for_selector(".reel")
 
 
-def show_calendar(page: Any) -> None:
+def show_calendar(page):
     page.keyboard.press("y")
     page.wait_for_selector(".calendar")
 
 
-def ask_wrongly(page: Any) -> None:
-    page.fill("#ask", "where is anna")
-    page.press("#ask", "Enter")
-    page.fill("#goto", "day 99")
-    page.press("#goto", "Enter")
+def ask_wrongly(page):
+    ask(page, "where is anna")
+    go_to(page, "day 99")
 
 
 NEW_STATES = (open_palette, open_menu, play_reel, show_calendar, ask_wrongly)

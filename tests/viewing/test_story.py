@@ -2,7 +2,6 @@
 
 from datetime import datetime
 from types import SimpleNamespace
-from typing import Any
 
 import pyarrow as pa
 import pytest
@@ -15,7 +14,7 @@ HOUR = 3600
 START = datetime(2026, 1, 5)
 
 
-def told(*rows: tuple[float, str, str, str | None, str], **tables: pa.Table) -> dict[str, Any]:
+def told(*rows, **tables):
     """Return the story of three days with these events, at hours since the start, by title."""
     names = ("step", "entity", "event", "user", "detail")
     steps = [(round(hours * HOUR), *rest) for hours, *rest in rows]
@@ -32,90 +31,66 @@ def told(*rows: tuple[float, str, str, str | None, str], **tables: pa.Table) -> 
     return {moment["title"]: moment for moment in story_of(run)}  # type: ignore[arg-type]
 
 
-def test_first_yes_is_the_first_that_was_accepted():
-    story = told(
-        (8, "astro", "asks", None, "vitamins ana"),
-        (9, "astro", "accepted", None, "vitamins ana"),
-        (33, "astro", "accepted", None, "walk ana"),
-    )
-
-    assert 9 * HOUR == story["The first yes"]["step"]
-    assert "Ana accepts what Astro asks: vitamins" == story["The first yes"]["words"]
-
-
-def test_longest_search_is_told_when_it_found_somebody():
-    story = told(
-        (8, "astro", "find_begins", None, "ana"),
-        (8.01, "astro", "found", None, "ana"),
-        (20, "astro", "find_begins", None, "ana"),
-        (20.05, "astro", "found", None, "ana"),
-        (30, "astro", "find_begins", None, "ana"),
-    )
-
-    assert "Astro finds Ana after 3 min 0 s" == story["The longest search"]["words"]
-    assert round(20.05 * HOUR) == story["The longest search"]["step"]
-
-
-def test_time_asleep_and_out_is_not_out_of_view():
-    story = told(
-        (0, "ana", "activity", None, "sleep"),
-        (7, "ana", "activity", None, "breakfast"),
-        (7.5, "astro", "user_seen", "ana", ""),
-        (8, "astro", "user_lost", "ana", ""),
-        (9, "ana", "left_home", None, ""),
-        (17, "ana", "came_home", None, ""),
-        (18.5, "astro", "user_seen", "ana", ""),
-        (22, "ana", "activity", None, "sleep"),
-    )
-
-    longest = story["The longest out of view"]
-    assert "Ana is up and at home, and out of view for 1 h 30 min" == longest["words"]
-    assert 17 * HOUR == longest["step"]
-
-
-def test_who_is_seen_by_one_of_two_robots_is_in_view():
-    story = told(
-        (6, "ana", "activity", None, "breakfast"),
-        (6, "astro", "user_seen", "ana", ""),
-        (7, "bot", "user_seen", "ana", ""),
-        (8, "astro", "user_lost", "ana", ""),
-        (12, "bot", "user_lost", "ana", ""),
-        (13, "bot", "user_seen", "ana", ""),
-    )
-
-    assert story["The longest out of view"]["words"].endswith("for 1 h 0 min")
-
-
 @pytest.mark.parametrize(
-    ("hours", "bed"),
+    ("title", "hour", "words", "events"),
     [
-        pytest.param(
-            {22.5: "sleep", 28: "toilet", 28.1: "sleep", 31: "breakfast",
-             47.75: "sleep", 55: "breakfast"},
-            "23:45", id="getting up at night",
-        ),
-        pytest.param(
-            {21: "sleep", 21.5: "tv", 23.25: "sleep", 31: "breakfast",
-             46: "sleep", 55: "breakfast"},
-            "23:15", id="a nap in the evening",
-        ),
+        pytest.param("The first yes", 9, "Ana accepts what Astro asks: vitamins", """
+            8 astro asks - vitamins ana
+            9 astro accepted - vitamins ana
+            33 astro accepted - walk ana""", id="what was only asked is no yes"),
+        pytest.param("The longest search", 20.05, "Astro finds Ana after 3 min 0 s", """
+            8 astro find_begins - ana
+            8.01 astro found - ana
+            20 astro find_begins - ana
+            20.05 astro found - ana
+            30 astro find_begins - ana""", id="a search that found nobody is none"),
+        pytest.param("The longest out of view", 17, "out of view for 1 h 30 min", """
+            0 ana activity - sleep
+            7 ana activity - breakfast
+            7.5 astro user_seen ana
+            8 astro user_lost ana
+            9 ana left_home -
+            17 ana came_home -
+            18.5 astro user_seen ana
+            22 ana activity - sleep""", id="time asleep and out is not out of view"),
+        pytest.param("The longest out of view", 12, "for 1 h 0 min", """
+            6 ana activity - breakfast
+            6 astro user_seen ana
+            7 bot user_seen ana
+            8 astro user_lost ana
+            12 bot user_lost ana
+            13 bot user_seen ana""", id="who is seen by one of two robots is in view"),
+        pytest.param("The latest night", 47.75, "Ana goes to bed at 23:45", """
+            22.5 ana activity - sleep
+            28 ana activity - toilet
+            28.1 ana activity - sleep
+            31 ana activity - breakfast
+            47.75 ana activity - sleep
+            55 ana activity - breakfast""", id="getting up at night"),
+        pytest.param("The latest night", 23.25, "Ana goes to bed at 23:15", """
+            21 ana activity - sleep
+            21.5 ana activity - tv
+            23.25 ana activity - sleep
+            31 ana activity - breakfast
+            46 ana activity - sleep
+            55 ana activity - breakfast""", id="a nap in the evening"),
+        pytest.param("The latest night", 49, "Ana goes to bed at 01:00", """
+            23.5 ana activity - sleep
+            31 ana activity - breakfast
+            49 ana activity - sleep
+            56 ana activity - breakfast""", id="after midnight is later than before"),
     ],
 )  # fmt: skip
-def test_one_goes_to_bed_once_a_night(hours, bed):
-    story = told(*((hour, "ana", "activity", None, what) for hour, what in hours.items()))
+def test_moment_is_told_of_events(title, hour, words, events):
+    rows = []
+    for line in events.split("\n")[1:]:
+        at, entity, event, user, *detail = line.split()
+        rows.append((float(at), entity, event, None if user == "-" else user, " ".join(detail)))
 
-    assert f"Ana goes to bed at {bed}" == story["The latest night"]["words"]
+    moment = told(*rows)[title]
 
-
-def test_bed_after_midnight_is_later_than_before():
-    story = told(
-        (23.5, "ana", "activity", None, "sleep"),
-        (31, "ana", "activity", None, "breakfast"),
-        (49, "ana", "activity", None, "sleep"),
-        (56, "ana", "activity", None, "breakfast"),
-    )
-
-    assert "Ana goes to bed at 01:00" == story["The latest night"]["words"]
+    assert round(hour * HOUR) == moment["step"]
+    assert moment["words"].endswith(words)
 
 
 def test_beliefs_have_settled_where_the_error_stays_near_its_last_value():
@@ -131,10 +106,6 @@ def test_beliefs_have_settled_where_the_error_stays_near_its_last_value():
     )
 
 
-def test_run_without_events_has_no_story():
-    assert {} == told()
-
-
 def test_home_without_people_has_no_story():
     run = fleet2d.run(
         "bundled:paper",
@@ -146,6 +117,7 @@ def test_home_without_people_has_no_story():
     )
 
     assert [] == story_of(run)
+    assert {} == told()
 
 
 @pytest.mark.slow

@@ -14,14 +14,14 @@ from fleet2d.floorplan.rooms.segmentation import (
 CELL = 0.1
 
 
-def chambers(*areas_m2: float, links: tuple[Link, ...]) -> Chambers:
+def chambers(*areas_m2, links):
     """Return chambers of these areas beside each other, each 1 m deep."""
     columns = [round(area / CELL) for area in areas_m2]
     row = np.append(np.repeat(np.arange(len(columns)), columns), -1).astype(np.int32)
     return Chambers(np.tile(row, (10, 1)), len(columns), links)
 
 
-def areas(rooms: np.ndarray) -> list[float]:
+def areas(rooms):
     return (np.bincount(rooms[rooms >= 0]) * CELL**2).round(2).tolist()
 
 

@@ -5,14 +5,14 @@ import shapely
 
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.mesh import build_mesh
-from fleet2d.floorplan.rooms.segmentation import Chambers, cut_chambers
+from fleet2d.floorplan.rooms.segmentation import cut_chambers
 from fleet2d.kernels import rasterize_cells
 
 LATTICE = Lattice(0.05, (0.0, 0.0), 120, 60)
 M = int(LATTICE.units_per_m)
 
 
-def cut(*xs: int, width_m: float = 6.0) -> Chambers:
+def cut(*xs, width_m=6.0):
     """Cut a box 2 m deep and `width_m` wide at lines across it, at these places [lattice]."""
     box = shapely.box(0, 0, width_m * M, 2 * M)
     mesh = build_mesh([box], LATTICE.columns, LATTICE.rows)
@@ -23,7 +23,7 @@ def cut(*xs: int, width_m: float = 6.0) -> Chambers:
     return chambers
 
 
-def sizes(chambers: Chambers) -> list[float]:
+def sizes(chambers):
     cells = np.bincount(chambers.of_cell[chambers.of_cell >= 0])
     return (cells * LATTICE.cell**2).round(2).tolist()
 

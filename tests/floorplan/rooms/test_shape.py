@@ -17,12 +17,12 @@ from fleet2d.floorplan.rooms.shape import (
     divide_by_shape,
     without_furniture,
 )
-from fleet2d.kernels import I64, label_parts
+from fleet2d.kernels import label_parts
 
 CELL = 0.1
 
 
-def divided(seed: int) -> I64:
+def divided(seed):
     """Return two rooms without a wall between them, and walls and obstacles."""
     rng = np.random.default_rng(seed)
     rooms = np.zeros((12, 20), np.int64)
@@ -74,7 +74,7 @@ def test_parts_are_in_one_piece_within_a_room_and_numbered_by_size(seed):
         assert 0 == label_parts(found == part, False).max()
 
 
-def space(*boxes: tuple[float, float, float, float]) -> I64:
+def space(*boxes):
     """Return free space of boxes [m]: 0 where free, -1 elsewhere."""
     free = np.zeros((60, 120), np.bool_)
     for x0, y0, x1, y1 in boxes:
@@ -82,7 +82,7 @@ def space(*boxes: tuple[float, float, float, float]) -> I64:
     return np.where(free, 0, -1)
 
 
-def areas(rooms: I64) -> list[float]:
+def areas(rooms):
     return (np.bincount(rooms[rooms >= 0]) * CELL**2).round(1).tolist()
 
 

@@ -1,8 +1,5 @@
 """Maps in bags: the last grid of a topic, its frame, and what is wrong with it."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,7 +10,7 @@ from fleet2d.homes.formats.bag import BagMap
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 
 
-def write(path: Path, *grids: tuple[str, Any], resolution: float = 0.1, turn: float = 0.0) -> Path:
+def write(path, *grids, resolution=0.1, turn=0.0):
     """Write a bag with maps whose lower left corner is at (-1, 2)."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
@@ -21,7 +18,7 @@ def write(path: Path, *grids: tuple[str, Any], resolution: float = 0.1, turn: fl
     store = get_typestore(Stores.ROS2_HUMBLE)
     new = store.types
     with Writer(path, version=8, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections: dict[str, Any] = {}
+        connections = {}
         for number, (topic, cells) in enumerate(grids):
             if topic not in connections:
                 connections[topic] = writer.add_connection(
@@ -45,7 +42,7 @@ def write(path: Path, *grids: tuple[str, Any], resolution: float = 0.1, turn: fl
     return path
 
 
-def room(width: int = 60, height: int = 40) -> Any:
+def room(width=60, height=40):
     """Return a free room with walls around it, and unknown cells outside."""
     cells = np.full((height + 10, width + 10), -1)
     cells[4 : height + 6, 4 : width + 6] = 100

@@ -1,6 +1,4 @@
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +6,6 @@ from tests.drawings import STYLES, Drawing
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan
-from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.homes.formats.drawing import Image
 from fleet2d.homes.formats.drawn_walls import find_gaps
 
@@ -18,17 +15,17 @@ PIXEL = 0.025
 
 
 @cache
-def drawn(style: str) -> Drawing:
+def drawn(style):
     return Drawing(load_floorplan("synthetic:33"), style, PIXEL)
 
 
-def read(folder: Path, style: str, suffix: str = ".png", **settings: Any) -> FloorPlan:
+def read(folder, style, suffix=".png", **settings):
     path = folder / f"flat{suffix}"
     drawn(style).picture.save(path)
     return Image.model_construct(path=path, resolution=PIXEL, cell=None, **settings).load()
 
 
-def agreement(plan: FloorPlan, style: str) -> float:
+def agreement(plan, style):
     truth = drawn(style).truth
     return float(plan.free_space.intersection(truth).area / plan.free_space.union(truth).area)
 

@@ -1,6 +1,3 @@
-from pathlib import Path
-from typing import Any
-
 import pytest
 import yaml
 from tests.small_home import INNER_M, TYPES, VARIATIONS, check, small_home
@@ -11,7 +8,7 @@ from fleet2d.floorplan.load import load_floorplan
 from fleet2d.homes.formats.espresense import Espresense
 
 
-def floor(name: str, low: float, *rooms: tuple[str, list[list[float]]]) -> dict[str, Any]:
+def floor(name, low, *rooms):
     return {
         "id": name.lower(),
         "name": name,
@@ -22,13 +19,13 @@ def floor(name: str, low: float, *rooms: tuple[str, list[list[float]]]) -> dict[
 
 KITCHEN = ("Kitchen", [[0, 0], [4, 0], [4, 3], [0, 3]])
 BEDROOM = ("Bedroom", [[4, 0], [8, 0], [8, 3], [4, 3]])
-SAMPLE: tuple[str, dict[str, Any]] = (
+SAMPLE = (
     "espresense.yaml",
     {"floors": [floor("Ground", 0, KITCHEN, BEDROOM)], "nodes": [{"name": "Desk"}]},
 )
 
 
-def write(folder: Path, *floors: dict[str, Any]) -> Path:
+def write(folder, *floors):
     path = folder / "espresense.yaml"
     path.write_text(yaml.safe_dump({"floors": list(floors)}))
     return path

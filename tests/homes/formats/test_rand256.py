@@ -1,6 +1,4 @@
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +15,7 @@ from fleet2d.homes.formats.valetudo import (
 WIDTH, HEIGHT, LEFT, TOP = 40, 30, 492, 497
 
 
-def image() -> dict[str, Any]:
+def image():
     inside = [r * WIDTH + c for r in range(1, HEIGHT - 1) for c in range(1, WIDTH - 1)]
     walls = [r * WIDTH + c for r in range(HEIGHT) for c in range(WIDTH)]
     return {
@@ -28,7 +26,7 @@ def image() -> dict[str, Any]:
     }
 
 
-def raw(**changes: Any) -> dict[str, Any]:
+def raw(**changes):
     return {
         "image": image(),
         "path": {"points": [[25600, 25700], [25700, 25700]]},
@@ -37,7 +35,7 @@ def raw(**changes: Any) -> dict[str, Any]:
     }
 
 
-def write(folder: Path, content: object) -> Path:
+def write(folder, content):
     path = folder / "raw.json"
     path.write_text(json.dumps(content), encoding="utf-8")
     return path

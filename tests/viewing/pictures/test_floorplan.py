@@ -1,7 +1,6 @@
 import builtins
 import importlib
 import sys
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -24,7 +23,7 @@ def home():
     return load_floorplan()
 
 
-def pixels(plan: FloorPlan, *places: tuple[float, float], **options: bool) -> list[list[float]]:
+def pixels(plan, *places, **options):
     """Draw a plan and return the colours (r, g, b) at places [m]."""
     figure = Figure(figsize=(8, 8), dpi=100)
     canvas = FigureCanvasAgg(figure)
@@ -80,7 +79,7 @@ def test_holes_are_walls_only_near_their_edges():
     assert np.allclose(to_rgb(ROOM_COLORS["unknown"]), free, atol=0.01)
 
 
-def words(plan: FloorPlan, **options: bool) -> list[str]:
+def words(plan, **options):
     figure = Figure(figsize=(8, 8))
     axes = figure.add_axes((0, 0, 1, 1))
     floorplan_axes(plan, axes, **options)
@@ -141,7 +140,7 @@ def test_a_place_that_cannot_be_written_is_refused(home, tmp_path):
 def test_without_matplotlib_the_extra_is_named(monkeypatch):
     real = builtins.__import__
 
-    def without(name: str, *args: Any, **kwargs: Any) -> Any:
+    def without(name, *args, **kwargs):
         if name.partition(".")[0] == "matplotlib":
             raise ModuleNotFoundError(name)
         return real(name, *args, **kwargs)
