@@ -250,15 +250,3 @@ def test_command_does_not_deny_what_its_notes_say(tmp_path):
     result = CliRunner().invoke(app, ["validate", str(file)])
 
     assert "ok: nothing wrong; the notes tell what is odd in the file\nnote: small" in result.output
-
-
-@pytest.mark.slow
-def test_command_says_what_a_large_robot_cannot_do():
-    words = ["validate", "family_home", "--radius"]
-
-    result = CliRunner().invoke(app, [*words, "0.44"])
-    assert 2 == result.exit_code
-    assert "1 wrong: a body of radius 0.44 m" in result.output
-    result = CliRunner().invoke(app, [*words, "3"])
-    assert 2 == result.exit_code
-    assert "1 unlivable: a body of radius 3 m fits nowhere in family_home" in result.output

@@ -6,7 +6,7 @@ import zipfile
 import pytest
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.load import is_floorplan, load_floorplan
+from fleet2d.floorplan.load import load_floorplan
 
 
 def zipped(name):
@@ -86,10 +86,3 @@ def test_pictures_of_a_few_pixels_are_refused(tmp_path):
 
     with pytest.raises(FloorPlanError, match="without its scale"):
         load_floorplan(tmp_path / "map.pgm")
-
-
-def test_validate_names_files_of_other_programs_too(tmp_path):
-    (tmp_path / "house.rvt").write_bytes(FILES["house.rvt"][0])
-
-    assert is_floorplan(tmp_path / "house.rvt")
-    assert not is_floorplan(tmp_path / "missing.rvt")

@@ -6,7 +6,7 @@ import pytest
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furniture import FURNITURE, furniture_type, stand_furniture
-from fleet2d.kernels import QUARTER, TURN
+from fleet2d.kernels import TURN
 
 ALL = [pytest.param(furniture, id=furniture.type) for furniture in FURNITURE.values()]
 
@@ -24,21 +24,6 @@ def test_people_stand_beside_blocking_furniture_and_not_in_it(furniture):
             assert abs(use.y) <= (y1 - y0) / 2 + 0.5
 
 
-@pytest.mark.parametrize(
-    ("heading", "x", "y", "facing"),
-    [
-        (0, 3.65, 2.0, math.pi),
-        (QUARTER, 3.0, 2.65, 1.5 * math.pi),
-        (2 * QUARTER, 2.35, 2.0, 0.0),
-        (3 * QUARTER, 3.0, 1.35, 0.5 * math.pi),
-    ],
-)
-def test_person_stands_before_a_stove_and_faces_it(heading, x, y, facing):
-    (use,) = stand_furniture("stove", (3.0, 2.0), heading, (0.6, 0.6)).uses
-
-    assert pytest.approx((x, y, facing)) == (use.x, use.y, use.heading)
-
-
 def test_turning_a_piece_turns_its_footprint_and_its_uses():
     plain = stand_furniture("bed", (0.0, 0.0), 0, (1.6, 2.0))
     turned = stand_furniture("bed", (0.0, 0.0), TURN // 8, (1.6, 2.0))
@@ -49,14 +34,6 @@ def test_turning_a_piece_turns_its_footprint_and_its_uses():
         expected = (c * before.x - c * before.y, c * before.x + c * before.y)
         assert pytest.approx(expected) == (after.x, after.y)
     assert pytest.approx(math.pi / 4) == turned.heading
-
-
-def test_bed_lies_from_the_pillow_along_its_heading():
-    bed = stand_furniture("bed", (0.0, 0.0), 0, (1.6, 2.0))
-
-    assert (-1.0, -0.8, 1.0, 0.8) == pytest.approx(bed.footprint.bounds)
-    assert ["lie", "lie", "stand", "stand"] == [use.posture for use in bed.uses]
-    assert [0.4, -0.4] == pytest.approx([use.y for use in bed.uses[:2]])
 
 
 def test_unknown_type_is_refused_with_the_nearest_name():

@@ -54,18 +54,6 @@ def test_views_through_glass_are_those_of_the_slow_reference(seed):
     assert visible(walls_of(snapped), eye, np.array(points)).tolist() == seen.tolist()
 
 
-def test_robot_sees_through_glass_and_drives_round_it():
-    home = Home(office())
-    space, point_at = home.space(0.15), home.plan.lattice.point_at
-    route = space.route(point_at((3.0, 2.0)), point_at((5.0, 2.0)))
-
-    assert sees(home, (1, 2), (7, 2))
-    assert not sees(home, (1, 0.5), (7, 0.5))
-    assert route is not None
-    assert route[:, 1].max() > point_at((0, 4))[1]
-    assert [] == list(home.plan.notes)
-
-
 def test_bodies_on_the_border_of_their_space_get_inside_on_their_side_of_the_glass():
     home = Home(office(WITHOUT_DOOR))
     (x, y), beyond = (home.plan.lattice.point_at(at) for at in ((3.9, 2), (4.3, 2)))

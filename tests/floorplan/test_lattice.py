@@ -45,16 +45,6 @@ def test_single_point_is_converted_as_arrays_are(cell):
         assert lattice.to_metres(point).tolist() == list(lattice.xy_of(*point))
 
 
-def test_to_walls_gives_even_points_only():
-    lattice = Lattice(0.05, (-0.1, -0.1), 100, 100)
-    points = np.random.default_rng(1).uniform(0, 4, (500, 2))
-
-    walls = lattice.to_walls(points)
-
-    assert not (walls % 2).any()
-    assert np.abs(lattice.to_metres(walls) - points).max() <= 1 / lattice.units_per_m + 1e-12
-
-
 @pytest.mark.parametrize("cell", [0.0, 0.009, 1.01, -0.05, float("nan"), float("inf")])
 def test_cell_out_of_range_is_refused(cell):
     with pytest.raises(FloorPlanError, match=r"choose a cell size from 0\.01 m to 1 m"):

@@ -1,7 +1,5 @@
 """Layers: their cells, their names, and what is refused."""
 
-import copy
-
 import numpy as np
 import pytest
 from tests.scenes import flat_path, scenario
@@ -74,18 +72,6 @@ def test_unknown_layer_names_the_known_ones_and_how_to_add_it(home):
     with pytest.raises(ComponentError, match="outside the grid"):
         home.layers["dust"].at(100, 3)
     assert "dusk" not in home.layers
-
-
-def test_copies_of_a_home_have_layers_of_their_own(home):
-    layer = home.layers.add("dust")
-    state = {"home": home, "layer": layer, "values": layer.values}
-    twin = copy.deepcopy(state)
-    twin["layer"].values += 1
-
-    assert twin["home"].layers["dust"] is twin["layer"]
-    assert twin["home"].layers["dust"].values is twin["values"]
-    assert not layer.values.any()
-    assert twin["values"].all()
 
 
 def test_layers_of_the_run_are_read_only(home):

@@ -3,7 +3,6 @@
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from fleet2d.configuration.built_in import COMPONENTS
@@ -12,28 +11,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import advise_type, format_of_file, is_floorplan, load_floorplan
 from fleet2d.floorplan.source import FloorPlanSource
 from fleet2d.homes.synthetic.source import Synthetic
-
-# How many rooms the file has (None: it names none), and its free space without specks and scraps [m2].
-MAPS = {
-    "ros_maps/aws_small_house/map.yaml": (None, 155.5),
-    "ros_maps/turtlebot3_house/map.yaml": (None, 19.8),
-    "valetudo/dreame_d9_no_segments.json": (None, 24.3),
-    "valetudo/dreame_x40_named_rooms.json": (5, 29.3),
-    "valetudo/dreame_z10_named_rooms_and_paths.json": (7, 40.1),
-    "valetudo/roborock_s6_segments.json": (6, 45.8),
-}
-
-
-@pytest.mark.parametrize("file", MAPS)
-def test_map_has_the_rooms_and_the_area_of_its_file(shared_data, file):
-    rooms, area = MAPS[file]
-
-    plan = load_floorplan(shared_data / file)
-
-    assert area == pytest.approx(plan.area_m2, abs=0.05)
-    assert rooms in (None, len(plan.rooms))
-    assert np.array_equal(plan.free, plan.room_of_cell >= 0)
-    assert plan.area_m2 == pytest.approx(sum(room.area_m2 for room in plan.rooms))
 
 
 def test_synthetic_home_is_named_by_its_seed():

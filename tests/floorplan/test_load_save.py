@@ -225,16 +225,6 @@ def test_convert_writes_a_plan_of_any_format_and_says_its_notes(fleet2d, shared_
     assert load_floorplan(path) == load_floorplan("home.geojson")
 
 
-def test_convert_never_overwrites(fleet2d):
-    Path("home.json").write_text("mine")
-
-    code, _, err = fleet2d("convert", "family_home", "home.json")
-
-    assert 2 == code
-    assert "home.json exists already" in err
-    assert "mine" == Path("home.json").read_text()
-
-
 def test_convert_of_a_picture_takes_its_resolution(fleet2d):
     rows = b"\x00" * 60 + (b"\x00" * 10 + b"\xff" * 40 + b"\x00" * 10) * 40 + b"\x00" * 60
     Path("flat.pgm").write_bytes(b"P5\n60 42\n255\n" + rows)

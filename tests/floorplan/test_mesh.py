@@ -111,12 +111,6 @@ def test_polygons_may_touch_at_corners_and_at_walls():
     check_mesh(build_mesh(polygons, 10, 10), polygons)
 
 
-def test_corners_in_the_middle_of_a_straight_wall_are_dropped():
-    mesh = build_mesh([Polygon([(0, 0), (320, 0), (640, 0), (640, 640), (0, 640)])], 10, 10)
-
-    assert [[0, 0], [0, 640], [640, 0], [640, 640]] == mesh.vertices.tolist()
-
-
 @pytest.mark.parametrize(
     ("polygons", "message"),
     [

@@ -4,7 +4,7 @@ import pytest
 import shapely
 
 from fleet2d.errors import FloorPlanError
-from fleet2d.floorplan.mesh import free_on_lattice, part_notes
+from fleet2d.floorplan.mesh import free_on_lattice
 
 
 def test_same_walls_in_another_order_are_the_same_free_space():
@@ -33,13 +33,3 @@ def test_free_space_that_is_there_already_is_not_moved():
 def test_what_is_no_home_is_refused(free, words):
     with pytest.raises(FloorPlanError, match=words):
         free_on_lattice("flat", free, 0.05)
-
-
-def test_parts_are_noted_the_largest_first():
-    lattice, parts = free_on_lattice(
-        "flat", shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 5, 1)]), 0.05
-    )
-    assert ["the free space is in 2 parts that nothing joins: 3.00, 1.00 m2"] == part_notes(
-        lattice, parts
-    )
-    assert [] == part_notes(lattice, parts[:1])

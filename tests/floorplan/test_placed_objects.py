@@ -22,14 +22,6 @@ SOFA = PlacedObject(
 )
 
 
-def test_quarter_turn_is_exact():
-    sofa = move_object(SOFA, LATTICE, (5, 5), 90)
-    assert (4.5, 4, 5.5, 6) == sofa.footprint.bounds
-    (use,) = sofa.uses
-    assert (5, 5) == (use.x, use.y)
-    assert math.pi == pytest.approx(use.heading)
-
-
 @given(st.floats(-360, 360), st.floats(1, 9), st.floats(1, 9))
 def test_moved_object_keeps_its_size_to_the_lattice(turn, x, y):
     sofa = move_object(SOFA, LATTICE, (x, y), turn)

@@ -21,22 +21,6 @@ def flat():
     return FloorPlan.build("flat", shapely.union_all(rooms), labels, entrance=(0.5, 0.5))
 
 
-def test_build_gives_walls_cells_and_rooms(flat):
-    assert 6.0 + 8.4 + 0.2 == pytest.approx(flat.area_m2)
-    assert ["kitchen_1", "bedroom_1"] == [room.name for room in flat.rooms]
-    assert [40 * 60 + 2 * 20, 56 * 60 + 2 * 20] == [room.cells for room in flat.rooms]
-    assert flat.free.sum() == sum(room.cells for room in flat.rooms)
-    assert (0.0, 0.0, 5.0, 3.0) == pytest.approx(flat.bounds)
-    assert () == flat.notes
-
-
-def test_free_cells_are_those_with_their_centre_inside(flat):
-    x, y = flat.lattice.centre_axes()
-    inside = shapely.contains_xy(shapely.union_all(flat.polygons), *np.meshgrid(x, y))
-
-    assert np.array_equal(inside, flat.free)
-
-
 def test_anchor_is_the_deepest_cell_lowest_row_then_column(flat):
     for room in flat.rooms:
         depth = squared_distance(flat.room_of_cell == room.index)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import shapely
-from PIL import Image as Picture
 from tests.homes.test_damaged_files import FORMATS, PGM, write
 
 from fleet2d.configuration.components import lookup
@@ -11,7 +10,6 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.load import load_floorplan
 from fleet2d.floorplan.source import FloorPlanSource
-from fleet2d.homes.formats.drawing import Image
 from fleet2d.homes.synthetic.source import Synthetic
 
 
@@ -52,30 +50,6 @@ def test_scale_multiplies_everything_in_a_home():
     )
     assert large_bed.uses[0].x == 2 * bed.uses[0].x
     assert doubled.entrance == tuple(2 * value for value in usual.entrance or ())
-
-
-def test_pixels_of_a_scaled_map_are_its_cells(tmp_path):
-    path = write(tmp_path, "map.yaml", {**FORMATS["ros"][1], "resolution": 5})
-    (tmp_path / "map.pgm").write_bytes(PGM)
-    source = lookup("floorplan", "ros").model_validate({"path": path, "scale": 0.01})
-    assert isinstance(source, FloorPlanSource)
-
-    assert source.cell == pytest.approx(0.05)
-    assert source.plan().lattice.cell == pytest.approx(0.05)
-    with pytest.raises(FloorPlanError, match=r"resolution is 5 m per pixel.*floorplan\.scale"):
-        load_floorplan(path)
-
-
-def test_drawing_has_the_product_of_resolution_and_scale(tmp_path):
-    pixels = np.full((60, 80), 255, np.uint8)
-    pixels[5:55, 5:75] = 0
-    pixels[10:50, 10:70] = 255
-    Picture.fromarray(pixels).save(tmp_path / "flat.png")
-
-    plan = Image(path=tmp_path / "flat.png", resolution=0.2, scale=0.5).plan()
-
-    assert 0.1 == plan.lattice.cell
-    assert plan.area_m2 == pytest.approx(24.0)
 
 
 @pytest.mark.parametrize("scale", [10.0, 39.37, 100.0, 1000.0, 0.1])

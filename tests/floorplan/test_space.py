@@ -408,20 +408,6 @@ def test_walls_are_moved_as_far_as_they_grow(polygons, radius):
         assert moved is None or moved.equals(rest)
 
 
-@pytest.mark.parametrize("step", [2, 40, 128, 186, 188, 400])
-@pytest.mark.parametrize("low", [False, True])
-def test_steps_in_walls_are_hidden_by_what_stands_beside_them(step, low):
-    corners = [(0, 0), (4000, 0), (4000, 3000), (2000, 3000 + step), (0, 3000 + step)]
-    if low:
-        corners = [(x, 3000 + step - y if y >= 3000 else y) for x, y in corners]
-        corners = [(x, y + 3000 if i > 1 else y) for i, (x, y) in enumerate(corners)]
-    upright = [*corners[:3], (2000, corners[2][1]), *corners[3:]]
-    ((moved, rest),) = moved_and_grown([Polygon(upright)], 320)
-
-    assert moved is not None
-    assert moved.equals(rest)
-
-
 def test_walls_are_not_moved_through_each_other():
     narrow = shapely.union_all([shapely.box(0, 0, 999, 999), shapely.box(998, 400, 1999, 500)])
     slanted = Polygon([(0, 0), (4000, 0), (4000, 3000)])

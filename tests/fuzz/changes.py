@@ -1,11 +1,10 @@
 """Changes to inputs: to their structure, to their text, to their bytes."""
 
 import copy
-from typing import Any
 
 from hypothesis import strategies as st
 
-ODD: list[Any] = [
+ODD = [
     None, True, False, 0, -1, 1, 0.5, -0.0, 1e-300, 1e300, float("inf"), float("nan"), 2**31, 2**63,
     -(2**63), 10**40, int("9" * 400), "", " ", "x", "0", "nan", "1e999", "24:00", "-1 s", "9" * 400,
     "30 s", "../x", "/dev/zero", "a:b", "mine:Class", "\0", "\u202e", "é" * 50, "x" * 5000, "{0}", "%s",
@@ -23,9 +22,9 @@ WORDS = [
 """Pieces that mean something to one reader or another."""
 
 
-def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+def places(content, where=()):
     """All key paths of a nested content but its root."""
-    entries: list[tuple[Any, Any]] = []
+    entries = []
     if isinstance(content, dict):
         entries = list(content.items())
     elif isinstance(content, list):
@@ -37,7 +36,7 @@ def places(content: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 @st.composite
-def structures(draw: st.DrawFn, seed: Any) -> Any:
+def structures(draw, seed):
     """A content with some of its parts replaced, removed, repeated, wrapped or put elsewhere."""
     content = copy.deepcopy(seed)
     for _ in range(draw(st.integers(1, 4))):
@@ -69,7 +68,7 @@ def structures(draw: st.DrawFn, seed: Any) -> Any:
     return content
 
 
-def _at(content: Any, where: tuple[Any, ...]) -> Any:
+def _at(content, where):
     try:
         for step in where:
             content = content[step]
@@ -79,7 +78,7 @@ def _at(content: Any, where: tuple[Any, ...]) -> Any:
 
 
 @st.composite
-def pieces(draw: st.DrawFn, seed: bytes) -> bytes:
+def pieces(draw, seed):
     """Bytes with some flipped, cut, repeated, or with pieces put in."""
     content = bytearray(seed)
     for _ in range(draw(st.integers(1, 4))):
@@ -98,7 +97,7 @@ def pieces(draw: st.DrawFn, seed: bytes) -> bytes:
 
 
 @st.composite
-def lines(draw: st.DrawFn, seed: str) -> bytes:
+def lines(draw, seed):
     """A text of lines of words with some changed, removed, swapped or repeated."""
     rows = [line.split(" ") for line in seed.split("\n")]
     for _ in range(draw(st.integers(1, 4))):

@@ -332,6 +332,17 @@ def _drawing(path):
     return load_floorplan(path, resolution=0.1)
 
 
+LOGS = {
+    "casas": ("events.txt", CASAS),
+    "uci sensors": ("home_Sensors.txt", SENSORS),
+    "uci activities": ("home_ADLs.txt", ADLS),
+    "homer": ("day.txt", HOMER),
+    "casas events": ("data", EVENTS),
+    "kasteren": ("kast_houseB-ss.txt", KASTEREN),
+    "mit": ("activities_data.csv", MIT),
+    "openshs": ("d1.csv", OPENSHS),
+    "states": ("history.csv", STATES),
+}
 READERS = {
     reader.name: reader
     for reader in (
@@ -342,15 +353,10 @@ READERS = {
         Reader("flat", "flat.json", lambda: _json(flat_document()), load_floorplan, cost=3),
         Reader("map", "map.pgm", lambda: pieces(PGM), _drawing),
         Reader("drawing", "map.png", lambda: pieces(_png()), _drawing),
-        Reader("casas", "events.txt", lambda: lines(CASAS), _replay, cost=2),
-        Reader("uci sensors", "home_Sensors.txt", lambda: lines(SENSORS), _replay, cost=2),
-        Reader("uci activities", "home_ADLs.txt", lambda: lines(ADLS), _replay, cost=2),
-        Reader("homer", "day.txt", lambda: lines(HOMER), _replay, cost=2),
-        Reader("casas events", "data", lambda: lines(EVENTS), _replay, cost=2),
-        Reader("kasteren", "kast_houseB-ss.txt", lambda: lines(KASTEREN), _replay, cost=2),
-        Reader("mit", "activities_data.csv", lambda: lines(MIT), _replay, cost=2),
-        Reader("openshs", "d1.csv", lambda: lines(OPENSHS), _replay, cost=2),
-        Reader("states", "history.csv", lambda: lines(STATES), _replay, cost=2),
+        *(
+            Reader(name, file, lambda text=text: lines(text), _replay, cost=2)
+            for name, (file, text) in LOGS.items()
+        ),
         Reader("history", "history.json", lambda: _json(json.loads(HISTORY)), _replay, cost=2),
         Reader("fixes", "rtls.csv", _words(FIXES), _replay, cost=2),
         Reader(

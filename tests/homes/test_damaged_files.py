@@ -146,7 +146,8 @@ def test_rubbish_is_refused_in_a_few_words(tmp_path, kind, rubbish):
     path = write(tmp_path, name, content)
     path.write_bytes(RUBBISH[rubbish])
 
-    for way in (read, load_floorplan):
+    ways = (read, load_floorplan) if kind.startswith("native") else (read,)  # both suffixes once
+    for way in ways:
         assert len(refusal(way, path)) < 1000
 
 

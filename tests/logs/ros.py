@@ -62,12 +62,23 @@ class Ros:
         one = self.new("geometry_msgs/msg/TransformStamped", self.header(ns, parent), child, move)
         return self.new("tf2_msgs/msg/TFMessage", [one])
 
-    def bag(self, path: Path, rows: Iterable[Row]) -> Path:
+    def grid(self, ns: int, cells: Any, pose: Any, resolution: float = 0.05) -> Any:
+        """A map of cells (rows, columns), whose lower left corner is at a pose."""
+        header = self.header(ns, "map")
+        size = (cells.shape[1], cells.shape[0])
+        info = self.new("nav_msgs/msg/MapMetaData", header.stamp, resolution, *size, pose)
+        return self.new("nav_msgs/msg/OccupancyGrid", header, info, cells.ravel().astype(np.int8))
+
+    def bag(self, path: Path, rows: Iterable[Row], storage: str = "SQLITE3") -> Path:
         """Write messages: topic, type, time [ns], message."""
         from rosbags.rosbag1 import Writer as Writer1
+        from rosbags.rosbag2 import StoragePlugin
         from rosbags.rosbag2 import Writer as Writer2
 
-        writer: Any = Writer2(path, version=9) if self.version == 2 else Writer1(path)
+        plugin = StoragePlugin[storage]
+        writer: Any = (
+            Writer2(path, version=9, storage_plugin=plugin) if self.version == 2 else Writer1(path)
+        )
         with writer:
             connections: dict[str, Any] = {}
             for topic, kind, ns, message in rows:

@@ -87,16 +87,6 @@ def test_gaps_between_regions_are_noted():
     ] == notes
 
 
-def test_rooms_are_numbered_by_type_in_file_order():
-    _, rooms, _ = assign(
-        region("Bedroom", 2, 0, 4, 3), region("Toilet", 0, 0, 1, 3), region("Bedroom", 1, 0, 2, 3)
-    )
-
-    assert ["bedroom_1", "toilet_1", "bedroom_2"] == list(rooms)
-    assert 0.8 * 2.6 == pytest.approx(rooms["toilet_1"].area_m2)
-    assert (1.0, 0.2, 2.0, 2.8) == pytest.approx(rooms["bedroom_2"].bounds)
-
-
 def test_the_same_box_under_two_labels_is_one_room_with_both():
     """Known failure 6: a kitchen with the same box as the dining room got no cells."""
     _, rooms, notes = assign(
@@ -120,15 +110,6 @@ def test_a_box_that_misses_the_free_space_is_a_note_and_no_room():
     assert ["garage_1", "unknown_1"] == list(rooms)
     assert 2 == len(notes)
     assert notes[0].startswith("the region garage from (7.00, 7.00) to (9.00, 9.00) m has no free")
-
-
-def test_polygons_take_the_cells_inside_them():
-    triangle = shapely.Polygon([(0, 0), (3, 0), (0, 3)])
-    room_of_cell, rooms, _ = assign(LabelledRegion(("Loggia",), triangle))
-
-    x, y = LATTICE.centre_axes()
-    expected = FREE & ((x[None, :] + y[:, None]) < 3 * LATTICE.units_per_m)
-    assert np.array_equal(expected, room_of_cell == rooms["loggia_1"].index)
 
 
 @quick

@@ -65,16 +65,6 @@ def test_gap_beside_a_wall_ends_at_the_foot_on_that_wall():
     assert ends(passage) in ({(4.0, 1.9), (4.0, 1.0)}, {(4.1, 1.9), (4.1, 1.0)})
 
 
-def test_jambs_on_a_slanted_wall_are_within_a_unit_of_it():
-    slanted = Polygon([(1, 1), (7, 1.3), (7, 4), (1, 4)])
-    stub = shapely.box(4.0, 2.0, 4.1, 5.0)
-
-    (passage,) = passages(shapely.difference(slanted, stub))
-
-    (x, y) = min(ends(passage), key=lambda end: end[1])
-    assert 1 + 0.3 * (x - 1) / 6 == pytest.approx(y, abs=2 / UNITS)
-
-
 @pytest.mark.parametrize(
     "free",
     [

@@ -13,7 +13,6 @@ from fleet2d.floorplan.rooms.shape import (
     IN_STRAIGHT_WALLS,
     OF_VACUUMS,
     Limits,
-    by_size,
     divide_by_shape,
     without_furniture,
 )
@@ -104,12 +103,6 @@ def test_a_corridor_ends_where_it_opens_into_a_hall(width, count, turns):
     assert count == len(areas(found))
 
 
-def test_corridor_is_one_room_however_long_and_bent():
-    assert [15.8] == areas(
-        divide_by_shape(space((0, 0, 12, 1), (11, 0, 12, 4.8)), CELL, IN_RAGGED_WALLS)
-    )
-
-
 @pytest.mark.parametrize(("limits", "count"), [(IN_RAGGED_WALLS, 1), (OF_VACUUMS, 2)])
 def test_small_room_counts_in_the_map_of_a_vacuum(limits, count):
     """Elsewhere, it would be a gap among furniture."""
@@ -141,10 +134,6 @@ def test_obstacle_at_the_edge_of_the_map_is_no_furniture():
     rooms[0, 2] = rooms[2, 2] = -1
 
     assert [[0, 2]] == np.argwhere(without_furniture(rooms, CELL) < 0).tolist()
-
-
-def test_rooms_of_one_size_keep_their_order():
-    assert [-1, 1, 2, 0, 0] == by_size(np.array([-1, 3, 5, 4, 4])).tolist()
 
 
 def test_cluttered_map_is_divided_where_it_narrows_and_has_a_doorway_there():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.logs.ros import Ros
 
 import fleet2d
 from fleet2d.errors import FloorPlanError
@@ -12,34 +13,13 @@ pytest.importorskip("rosbags", reason="the extra ros is not installed")
 
 def write(path, *grids, resolution=0.1, turn=0.0):
     """Write a bag with maps whose lower left corner is at (-1, 2)."""
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    new = store.types
-    with Writer(path, version=8, storage_plugin=StoragePlugin.MCAP) as writer:
-        connections = {}
-        for number, (topic, cells) in enumerate(grids):
-            if topic not in connections:
-                connections[topic] = writer.add_connection(
-                    topic, "nav_msgs/msg/OccupancyGrid", typestore=store
-                )
-            stamp = new["builtin_interfaces/msg/Time"](sec=number, nanosec=0)
-            half = turn / 2
-            pose = new["geometry_msgs/msg/Pose"](
-                new["geometry_msgs/msg/Point"](-1.0, 2.0, 0.0),
-                new["geometry_msgs/msg/Quaternion"](
-                    0.0, 0.0, float(np.sin(half)), float(np.cos(half))
-                ),
-            )
-            info = new["nav_msgs/msg/MapMetaData"](
-                stamp, resolution, cells.shape[1], cells.shape[0], pose
-            )
-            header = new["std_msgs/msg/Header"](stamp, "map")
-            message = new["nav_msgs/msg/OccupancyGrid"](header, info, cells.ravel().astype(np.int8))
-            data = store.serialize_cdr(message, "nav_msgs/msg/OccupancyGrid")
-            writer.write(connections[topic], number, data)
-    return path
+    ros = Ros(2)
+    corner = ros.pose(-1.0, 2.0, turn)
+    rows = [
+        (topic, "nav_msgs/msg/OccupancyGrid", ns, ros.grid(ns, cells, corner, resolution))
+        for ns, (topic, cells) in enumerate(grids)
+    ]
+    return ros.bag(path, rows, "MCAP")
 
 
 def room(width=60, height=40):

@@ -76,26 +76,6 @@ def test_rooms_without_a_way_to_the_rest_are_left_out_with_a_note(tmp_path):
     assert "left out: 5.72 m2 of free space" in plan.notes[0]
 
 
-def test_resolution_scales_and_is_the_default_cell(tmp_path):
-    path = draw(tmp_path)
-
-    assert 0.02 == read_image(path, 0.02).lattice.cell
-    assert 0.01 == read_image(path, 0.005, ray_width=0.02).lattice.cell
-    assert 0.1 == read_image(path, 0.02, 0.1).lattice.cell
-    assert read_image(path, 0.1).area_m2 == pytest.approx(4 * read_image(path, 0.05).area_m2)
-
-
-def test_transparent_paper_is_paper(tmp_path):
-    images = pytest.importorskip("PIL.Image")
-    black = np.zeros_like(HOME)
-    pixels = np.dstack([black, black, black, np.where(HOME == WALL, 255, 0).astype(np.uint8)])
-    images.fromarray(pixels).save(tmp_path / "flat.png")
-
-    plan = read_image(tmp_path / "flat.png", 0.05)
-
-    assert shapely.equals_exact(read(tmp_path).polygons, plan.polygons).all()
-
-
 @pytest.mark.parametrize(
     ("pixels", "message"),
     [

@@ -4,11 +4,9 @@ import math
 import numpy as np
 import pytest
 import shapely
-from pydantic import ValidationError
 from tests.small_home import INNER_M, VARIATIONS, check, noisy, small_home
 
 import fleet2d
-from fleet2d.configuration.components import lookup
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.load import load_floorplan, save_floorplan
 from fleet2d.homes.formats.geojson import GeoJson, geojson_document
@@ -179,17 +177,6 @@ def test_door_may_be_drawn_anywhere_in_the_wall(tmp_path, door):
     assert [4.15, 4.15] == pytest.approx([doorway.start[0], doorway.end[0]])
     assert 0.9 == pytest.approx(doorway.width_m)
     assert 12 + 4.7 * 3 + 0.3 * 0.9 == pytest.approx(plan.area_m2)
-
-
-def test_door_in_a_slanted_wall_opens_it_all_the_way(tmp_path):
-    left = ring((0, 0), (4, 0), (6, 4), (0, 4))
-    right = ring((4.2, 0), (9, 0), (9, 4), (6.2, 4))
-    door = feature(line((4.9, 1.6), (5.3, 2.4)), "door")
-
-    plan = read(tmp_path, feature(left, "room"), feature(right, "room"), door)
-
-    assert 1 == len(plan.polygons)
-    assert 0.89 == pytest.approx(plan.doorways[0].width_m, abs=0.02)
 
 
 def test_free_areas_are_free_and_rooms_are_their_names_then(tmp_path):
@@ -445,25 +432,6 @@ def test_door_along_an_outer_wall_of_free_space_leads_outside(tmp_path, y):
 
 
 # --- As a component, and wrong files ----------------------------------------------------------------
-
-
-def test_component_is_found_and_its_settings_have_an_effect(tmp_path):
-    path = write(tmp_path, *FLOORS, KITCHEN, BEDROOM)
-
-    source = GeoJson.model_validate({"path": str(path), "level": 1, "wall_m": "20 cm"})
-
-    assert GeoJson is lookup("floorplan", "geojson")
-    assert source.load() == read_geojson(path, level="1", wall_m=0.2)
-    assert source.load() != read_geojson(path)
-    with pytest.raises(ValidationError, match="units"):
-        GeoJson.model_validate({"path": str(path), "units": "feet"})
-
-
-def test_room_of_one_part_may_be_written_as_of_several(tmp_path):
-    one = read_geojson(write(tmp_path, KITCHEN, BEDROOM))
-    several = KITCHEN | {"geometry": parts(KITCHEN["geometry"])}
-
-    assert one == read_geojson(write(tmp_path, several, BEDROOM))
 
 
 @pytest.mark.parametrize(

@@ -158,13 +158,6 @@ def test_yaw_turns_the_map_about_its_origin(tmp_path, yaw):
         assert inside == (plan.room_at(x, y) is not None), place
 
 
-def test_origin_between_cells_moves_walls_by_less_than_the_lattice(tmp_path):
-    plan = read_ros(write(tmp_path, origin=[-3.2718, 1.0123, 0.0]))
-
-    assert 2.5 == pytest.approx(plan.area_m2, rel=1e-9)
-    assert (-3.1718, 1.1123) == pytest.approx(plan.bounds[:2], abs=0.05 / 64)
-
-
 # --- Cells --------------------------------------------------------------------------------------
 
 
@@ -221,16 +214,6 @@ def test_grey_of_unknown_is_not_floor_though_the_threshold_says_so(tmp_path, unk
     assert f"grey {unknown} is taken for unknown" in plan.notes[0]
 
 
-def test_grey_of_unknown_in_the_middle_of_a_map_is_no_floor(tmp_path):
-    pixels = ROOM.copy()
-    pixels[[0, -1]], pixels[:, [0, -1]] = OCCUPIED, OCCUPIED
-    pixels[20:26, 30:36] = UNKNOWN  # in the floor
-
-    plan = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey="auto")
-
-    assert plan.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
-
-
 def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chances_are(tmp_path):
     pixels = np.full((60, 80), UNKNOWN, np.uint8)
     pixels[5:-5, 5:-5] = FREE
@@ -245,18 +228,6 @@ def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chance
     assert 50 * 70 * 0.05**2 - 0.5 == pytest.approx(filled.area_m2)
     assert 50 * 70 * 0.05**2 == pytest.approx(shaded.area_m2)
     assert "grey 211 is taken for unknown" in filled.notes[0]
-
-
-def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path):
-    pixels = ROOM.copy()
-    pixels[20:26, 30:36] = 230
-
-    plain = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey="none")
-    named = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey=230)
-
-    assert plain.area_m2 == pytest.approx(2.5)
-    assert not any("unknown_grey" in note for note in plain.notes)
-    assert named.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
 
 
 @pytest.mark.parametrize("ground", [255, 240, 215])
@@ -322,21 +293,6 @@ def test_transparent_pixels_of_a_png_are_unknown(tmp_path):
 
 
 # --- Cleaning and straightening -----------------------------------------------------------------
-
-
-def test_cleaning_is_tuned_by_the_component(tmp_path):
-    pixels = ROOM.copy()
-    pixels[25, 25:29] = OCCUPIED  # 0.01 m2
-    pixels[20:22, 42:44] = FREE  # a gap in the wall, to the edge of the image
-    path = write(tmp_path, pixels)
-
-    cleaned = Ros(path=path).load()
-    plan = Ros(path=path, speck_area_m2=0, ray_width="1 cm").load()
-
-    assert 2.5 + 0.01 == pytest.approx(cleaned.area_m2)
-    assert 2.5 - 0.01 + 0.01 == pytest.approx(plan.area_m2)
-    assert 0 == len(cleaned.polygons[0].interiors)
-    assert 1 == len(plan.polygons[0].interiors)
 
 
 def test_simplify_straightens_jagged_walls_within_the_tolerance(tmp_path):

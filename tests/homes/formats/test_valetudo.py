@@ -219,25 +219,7 @@ def test_wall_removes_floor_with_a_note(tmp_path):
     assert "4 pixels are floor and wall: they count as wall" in plan.notes
 
 
-def test_pixels_that_share_a_corner_are_not_joined(tmp_path):
-    plan = home(tmp_path, layer("floor", [*runs(10, 10, 20, 20), *runs(20, 20, 30, 30)]))
-
-    assert 2 == len(plan.polygons)
-    assert pytest.approx(200 * PIXEL_AREA) == plan.area_m2
-
-
 # --- Rooms --------------------------------------------------------------------------------------
-
-
-def test_segments_are_rooms_and_other_floor_is_unknown(tmp_path):
-    plan = home(tmp_path)
-
-    rooms = [(room.name, room.type, room.labels, room.cells) for room in plan.rooms]
-    assert [
-        ("Kitchen", "kitchen", ("kitchen",), 1200),
-        ("segment_17", "unknown", ("segment_17",), 600),
-        ("unknown_1", "unknown", (), 200),
-    ] == rooms
 
 
 def test_segments_of_one_name_get_names_of_their_own(tmp_path):
@@ -466,7 +448,6 @@ def test_odd_layers_are_noted(tmp_path):
 # Two rooms of 2 m x 1.5 m with 1.5 m between them, and a scrap.
 LEFT = layer("segment", runs(0, 0, 40, 30), segmentId="1", name="Kitchen")
 RIGHT = layer("segment", runs(42, 0, 82, 30), segmentId="2", name="Office")
-SCRAP = layer("floor", runs(100, 0, 110, 10))
 
 
 def cleaned(folder, *layers, **settings):
@@ -480,16 +461,6 @@ def wall_with_gap(low, high):
     return layer("wall", [*runs(40, 0, 42, low), *runs(40, high, 42, 30)])
 
 
-def test_unknown_pixels_at_a_threshold_are_bridged(tmp_path):
-    plan = cleaned(tmp_path, LEFT, RIGHT, wall_with_gap(10, 28))
-
-    assert 1 == len(plan.polygons)
-    assert ["kitchen", "office"] == [room.type for room in plan.rooms]
-    assert plan.area_m2 == pytest.approx((2 * 40 * 30 + 2 * 18) * PIXEL_AREA)
-    assert "gaps of at most 2 pixels between parts of the home are open: 1" in " ".join(plan.notes)
-    assert 2 == len(cleaned(tmp_path, LEFT, RIGHT, wall_with_gap(10, 28), bridge_pixels=0).polygons)
-
-
 def test_wall_between_rooms_stays_unless_the_vacuum_drove_through(tmp_path):
     wall = wall_with_gap(0, 0)
     path = entity("path", 100, 75, 300, 75)
@@ -499,19 +470,6 @@ def test_wall_between_rooms_stays_unless_the_vacuum_drove_through(tmp_path):
 
     assert 2 == len(shut.polygons)
     assert 1 == len(driven.polygons)
-
-
-def test_scraps_of_floor_are_no_rooms(tmp_path):
-    plan = cleaned(tmp_path, LEFT, SCRAP)
-    beside = cleaned(tmp_path, LEFT, layer("floor", runs(40, 0, 50, 10)))
-    kept = cleaned(tmp_path, LEFT, SCRAP, scrap_area_m2=0)
-
-    assert ["Kitchen"] == [room.name for room in plan.rooms]
-    assert plan.area_m2 == pytest.approx(40 * 30 * PIXEL_AREA)
-    assert "scraps left out: 1 parts of the floor" in " ".join(plan.notes)
-    assert ["Kitchen"] == [room.name for room in beside.rooms]
-    assert beside.area_m2 == pytest.approx((40 * 30 + 100) * PIXEL_AREA)
-    assert ["Kitchen", "unknown_1"] == [room.name for room in kept.rooms]
 
 
 def test_segment_without_a_name_that_is_a_scrap_belongs_to_its_neighbor(tmp_path):

@@ -15,7 +15,7 @@ from fleet2d.homes.synthetic.generator import (
     generate,
 )
 from fleet2d.homes.synthetic.program import SIZES, Style, Wishes
-from fleet2d.homes.synthetic.slicing import Box, boxes_overlap, inner_walls
+from fleet2d.homes.synthetic.slicing import boxes_overlap
 from fleet2d.homes.synthetic.source import Synthetic
 
 SEEDS = some(range(60), 3)
@@ -95,7 +95,7 @@ def test_seed_gives_the_home_that_it_gives_on_every_machine(seed):
     [(36, 1, 1), (62, 2, 1), (90, 2, 2), (120, 3, 2), (186, 3, 2), (240, 5, 3), (300, 4, 3)],
 )
 def test_area_and_rooms_are_as_requested(area, bedrooms, bathrooms):
-    for seed in range(4):
+    for seed in range(2):
         plan = home(seed, area_m2=area, bedrooms=bedrooms, bathrooms=bathrooms)
         types = [room.type for room in plan.rooms]
         assert area == pytest.approx(plan.area_m2, rel=0.05)
@@ -149,16 +149,6 @@ def test_contradiction_is_refused_with_what_would_fit(settings, words):
 def test_setting_out_of_range_is_refused_with_its_limits(settings, message):
     with pytest.raises(ValueError, match=message):
         Synthetic(**settings)
-
-
-def test_walls_between_boxes_are_where_they_touch():
-    boxes = [Box(0, 0, 0, 40, 40), Box(1, 40, 20, 80, 60), Box(2, 0, 40, 40, 60)]
-    walls = {(wall.first, wall.second, wall.upright, *wall[3:]) for wall in inner_walls(boxes)}
-    assert {
-        (0, 1, True, 40, 20, 38),
-        (0, 2, False, 40, 0, 38),
-        (2, 1, True, 40, 40, 58),
-    } == walls
 
 
 def test_areas_spread_as_those_of_real_homes_do():
