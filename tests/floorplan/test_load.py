@@ -39,6 +39,11 @@ def test_advice_about_a_file_named_as_a_type_follows_its_content(name, content, 
     assert re.search(advice, advise_type(Text(name, tmp_path)))
 
 
+@pytest.mark.parametrize("name", ["synthetic", "acme.home", "mine.json:Home"])
+def test_no_advice_about_what_names_no_file(name):
+    assert advise_type(name) == ""
+
+
 def test_format_is_recognized_by_the_ending_that_it_declares(tmp_path, monkeypatch):
     class Drawn(FloorPlanSource):
         """A home, named in a file that is neither JSON nor YAML."""

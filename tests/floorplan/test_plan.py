@@ -37,6 +37,10 @@ def test_room_at_finds_rooms_and_nothing_in_walls_or_outside(flat):
     assert [None] * 4 == [flat.room_at(*at) for at in [(2.1, 0.5), (-3, 1), (1, 1e6), (9, -9)]]
 
 
+def test_room_by_name_or_index(flat):
+    assert flat.room("bedroom_1") is flat.room(1)
+
+
 def test_room_of_another_name_is_refused_with_the_nearest(flat):
     with pytest.raises(FloorPlanError, match=r"did you mean 'bedroom_1'.*kitchen_1, bedroom_1"):
         flat.room("bedrom_1")
@@ -113,3 +117,7 @@ def test_entrance_in_a_wall_is_refused_with_the_nearest_free_place():
         FloorPlanError, match=r"at \(-1, 2\) m is not in free space: .*\(0\.03, 1\.98\)"
     ):
         FloorPlan.build("flat", shapely.box(0, 0, 5, 3), entrance=(-1, 2))
+
+
+def test_repr_says_what_plan_it_is(flat):
+    assert "<FloorPlan flat: 14.6 m2, 2 rooms, 104 x 64 cells of 0.05 m>" == repr(flat)

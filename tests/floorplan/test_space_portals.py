@@ -9,6 +9,7 @@ from tests.scenes import scenario as lives
 
 import fleet2d
 from fleet2d.errors import FloorPlanError, ScenarioError
+from fleet2d.floorplan.checkup import checkup
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.load import load_floorplan
 
@@ -134,6 +135,16 @@ def test_portals_in_a_scenario_are_checked_where_they_stand(tmp_path):
         fleet2d.run(settings)
 
 
+def test_the_checkup_tells_what_a_robot_loses_that_climbs_no_stairs(tmp_path):
+    (found,) = checkup(load_floorplan(house(tmp_path)))
+
+    assert ("storeys", "odd") == (found.kind, found.severity)
+    assert (
+        "a robot that starts at (0.50, 0.50) m and climbs no stairs can't get to 20.0 m2 of"
+        " 40.0 m2: bedroom_1, bathroom_1"
+    ) == found.text
+
+
 @pytest.mark.parametrize(
     ("climbs", "rooms"), [(False, {"kitchen_1"}), (True, {"kitchen_1", "bedroom_1"})]
 )
@@ -146,3 +157,16 @@ def test_a_robot_gets_upstairs_if_it_climbs(tmp_path, climbs, rooms):
     way = path(stored, "astro")
     still = (np.diff(way.x) == 0) & (np.diff(way.y) == 0)
     assert rooms == {stored.plan.rooms[r].name for r in np.array(way.room)[1:][still]}
+
+
+def test_members_of_a_household_sleep_upstairs(tmp_path):
+    floorplan = {"type": "native", "path": str(house(tmp_path)), "furnish": True}
+    household = {"members": {"ana": "retired", "ben": "works_outside"}}
+    users = {name: {"type": "routine", "household": household} for name in household["members"]}
+    stored = run(lives("1 d", users=users, robots={}, floorplan=floorplan))
+
+    for name in users:
+        way = path(stored, name)
+        asleep = slice(60, 4 * 60)  # everybody is in bed at 01:00
+        rooms = [stored.plan.rooms[r].name for r in np.array(way.room)[asleep]]
+        assert rooms.count("bedroom_1") > 0.9 * len(rooms)

@@ -10,14 +10,13 @@ import struct
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pytest
+from tests.logs.ros import Ros
 
 from fleet2d.algorithms.algorithm import load_learned
 from fleet2d.algorithms.presence.learned import WEIGHTS, Weights
@@ -29,7 +28,6 @@ from fleet2d.logs.detections import read_detections
 from fleet2d.storage import apart
 
 BOMBS = Path(__file__).parent / "bombs"
-Reader = Callable[[Path], Any]
 
 
 def peak_mb(code, path):
@@ -190,58 +188,21 @@ POSE, GRID = "geometry_msgs/msg/PoseStamped", "nav_msgs/msg/OccupancyGrid"
 
 
 @cache
-def messages():
-    from rosbags.typesys import Stores, get_typestore
-
-    return get_typestore(Stores.ROS2_HUMBLE)
+def ros():
+    return Ros(2)
 
 
-def pose_message(types, x, y):
-    kinds = types.types
-    point = kinds["geometry_msgs/msg/Point"](x=x, y=y, z=0.0)
-    turn = kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
-    return kinds["geometry_msgs/msg/Pose"](position=point, orientation=turn)
-
-
-def stamp(types, second):
-    return types.types["builtin_interfaces/msg/Time"](sec=second, nanosec=0)
-
-
-def poses(types, frame="map"):
+def poses():
     rows = []
-    for second in range(1, 100):
-        header = types.types["std_msgs/msg/Header"](stamp=stamp(types, second), frame_id=frame)
-        message = types.types[POSE](header=header, pose=pose_message(types, 1.0, 2.0))
-        rows.append(("/pose", POSE, second, bytes(types.serialize_cdr(message, POSE))))
+    for ns in range(10**9, 10**11, 10**9):
+        message = ros().new(POSE, ros().header(ns, "map"), ros().pose(1.0, 2.0, 0.0))
+        rows.append(("/pose", POSE, ns, message))
     return rows
 
 
-def grid(types, side, x=0.0, y=0.0):
-    kinds = types.types
-    info = kinds["nav_msgs/msg/MapMetaData"](
-        map_load_time=stamp(types, 0),
-        resolution=0.05,
-        width=side,
-        height=side,
-        origin=pose_message(types, x, y),
-    )
-    header = kinds["std_msgs/msg/Header"](stamp=stamp(types, 1), frame_id="map")
-    cells = np.zeros(side * side, np.int8)
-    message = kinds[GRID](header=header, info=info, data=cells)
-    return "/map", GRID, 1, bytes(types.serialize_cdr(message, GRID))
-
-
-def bag(path, rows, storage="SQLITE3"):
-    from rosbags.rosbag2 import StoragePlugin, Writer
-
-    types = messages()
-    with Writer(path, version=8, storage_plugin=StoragePlugin[storage]) as writer:
-        connections = {}
-        for topic, kind, second, data in rows:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, kind, typestore=types)
-            writer.write(connections[topic], second * 10**9, data)
-    return path
+def grid(side, x=0.0):
+    cells = np.zeros((side, side))
+    return [("/map", GRID, 10**9, ros().grid(10**9, cells, ros().pose(x, 0.0, 0.0)))]
 
 
 @pytest.fixture(params=["SQLITE3", "MCAP"])
@@ -251,19 +212,34 @@ def storage(request):
 
 @pytest.fixture
 def good(tmp_path):
-    return bag(tmp_path / "bag", poses(messages()))
+    return ros().bag(tmp_path / "bag", poses())
 
 
 def database(folder):
     return next(folder.glob("*.db3"))
 
 
-def tamper(folder, *statements):
+def tamper(folder, *statements, values=()):
     connection = sqlite3.connect(database(folder))
     for statement in statements:
-        connection.execute(statement)
+        connection.execute(statement, values)
     connection.commit()
     connection.close()
+
+
+def zstd(content):
+    return pa.compress(content, "zstd", asbytes=True)
+
+
+def pack_database(folder, content=None):
+    """Pack the database of a bag, or other content in its place."""
+    file = database(folder)
+    packed_file = folder / f"{file.name}.zstd"
+    packed_file.write_bytes(zstd(file.read_bytes() if content is None else content))
+    file.unlink()
+    compress(folder, "file")
+    metadata = (folder / "metadata.yaml").read_text()
+    (folder / "metadata.yaml").write_text(metadata.replace(file.name, packed_file.name))
 
 
 def compress(folder, mode):
@@ -292,11 +268,10 @@ def read_map(path):
 
 
 def test_a_good_bag_is_read_packed_and_not(tmp_path, good, storage):
-    assert 99 == len(read_bag(bag(tmp_path / storage, poses(messages()), storage)).time_us)
+    assert 99 == len(read_bag(ros().bag(tmp_path / storage, poses(), storage)).time_us)
     connection = sqlite3.connect(database(good))
-    for number, data in connection.execute("SELECT id, data FROM messages").fetchall():
-        packed_data = pa.compress(data, "zstd", asbytes=True)
-        connection.execute("UPDATE messages SET data=? WHERE id=?", (packed_data, number))
+    connection.create_function("zstd", 1, zstd)
+    connection.execute("UPDATE messages SET data=zstd(data)")
     connection.commit()
     connection.close()
     compress(good, "message")
@@ -304,13 +279,7 @@ def test_a_good_bag_is_read_packed_and_not(tmp_path, good, storage):
 
 
 def test_a_good_bag_whose_file_is_packed_is_read(good):
-    file = database(good)
-    packed_file = good / f"{file.name}.zstd"
-    packed_file.write_bytes(pa.compress(file.read_bytes(), "zstd", asbytes=True))
-    file.unlink()
-    compress(good, "file")
-    text = (good / "metadata.yaml").read_text()
-    (good / "metadata.yaml").write_text(text.replace(file.name, packed_file.name))
+    pack_database(good)
     assert 99 == len(read_bag(good).time_us)
 
 
@@ -335,11 +304,7 @@ def test_bomb_mcap_is_refused_before_it_fills_the_memory():
 
 def test_bomb_of_zstd_in_the_messages_of_a_database_is_refused(good, monkeypatch):
     limit_memory(monkeypatch)
-    zeros = pa.compress(bytes(65 << 20), "zstd", asbytes=True)
-    connection = sqlite3.connect(database(good))
-    connection.execute("UPDATE messages SET data=?", (zeros,))
-    connection.commit()
-    connection.close()
+    tamper(good, "UPDATE messages SET data=?", values=(zstd(bytes(65 << 20)),))
     compress(good, "message")
     assert "FLEET2D_MAX_READ_MB" in refusal(good)
 
@@ -347,13 +312,7 @@ def test_bomb_of_zstd_in_the_messages_of_a_database_is_refused(good, monkeypatch
 @pytest.mark.skipif(os.name != "posix", reason="only Unix limits the size of files")
 def test_file_that_unpacks_to_more_than_a_log_has_is_refused(good, monkeypatch):
     monkeypatch.setenv("FLEET2D_MAX_LOG_BYTES", str(64 << 20))
-    file = database(good)
-    file.unlink()
-    zeros = pa.compress(bytes(65 << 20), "zstd", asbytes=True)
-    (good / f"{file.name}.zstd").write_bytes(zeros)
-    compress(good, "file")
-    metadata = (good / "metadata.yaml").read_text().replace(file.name, f"{file.name}.zstd")
-    (good / "metadata.yaml").write_text(metadata)
+    pack_database(good, bytes(65 << 20))
     assert "File too large" in refusal(good)
 
 
@@ -403,7 +362,7 @@ def test_a_tampered_database_is_refused(good, name):
 
 @pytest.mark.parametrize("name", ["trunc", "flip", "text", "zero"])
 def test_a_damaged_bag_is_refused(tmp_path, storage, name):
-    folder = bag(tmp_path / "bag", poses(messages()), storage)
+    folder = ros().bag(tmp_path / "bag", poses(), storage)
     path = next(p for p in folder.iterdir() if p.suffix in (".db3", ".mcap"))
     whole = path.read_bytes()
     flipped = bytes(b ^ 0x55 if 16 < i < 4000 else b for i, b in enumerate(whole))
@@ -451,26 +410,24 @@ def test_mapfar_is_refused():
 
 @pytest.mark.parametrize("x", [np.inf, -1e300, np.nan])
 def test_a_map_far_away_is_refused(tmp_path, storage, x):
-    folder = bag(tmp_path / "bag", [grid(messages(), 80, x)], storage)
+    folder = ros().bag(tmp_path / "bag", grid(80, x), storage)
     assert "the map of /map is damaged" in refusal(folder, read_map)
 
 
 @pytest.mark.slow
 def test_a_map_of_many_cells_is_refused(tmp_path, storage):
-    folder = bag(tmp_path / "bag", [grid(messages(), 8000)], storage)
+    folder = ros().bag(tmp_path / "bag", grid(8000), storage)
     assert "has 64000000 pixels, and at most 16777216" in refusal(folder, read_map)
 
 
 def test_a_bomb_of_bz2_in_a_bag_of_ros_1_is_refused(tmp_path, monkeypatch):
     from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
 
     path = tmp_path / "old.bag"
-    store = get_typestore(Stores.ROS1_NOETIC)
     writer = Writer(path)
     writer.set_compression(Writer.CompressionFormat.BZ2)
     with writer:
-        connection = writer.add_connection("/map", GRID, typestore=store)
+        connection = writer.add_connection("/map", GRID, typestore=Ros(1).types)
         writer.write(connection, 10**9, bytes(65 << 20))
     limit_memory(monkeypatch)
     assert "FLEET2D_MAX_READ_MB" in refusal(path, load_floorplan)

@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+from tests.homes.formats.test_geojson import feature, line, ring, write
 from tests.thorough import THOROUGH
 
 MAX_SECONDS, MAX_MB = 10, 1000
@@ -98,30 +99,22 @@ def comb_of(teeth):
     return [[0, 0], [60, 0], *tips, [0, 10]]
 
 
-def geojson(folder, corners):
-    room = {
-        "type": "Feature",
-        "properties": {"kind": "room"},
-        "geometry": {"type": "Polygon", "coordinates": [[*corners, corners[0]]]},
-    }
-    path = folder / "home.geojson"
-    content = {"type": "FeatureCollection", "units": "m", "features": [room]}
-    path.write_text(json.dumps(content), encoding="utf-8")
-    return path
+def room_of(folder, corners):
+    return write(folder, feature(ring(*corners), "room"), units="m")
 
 
 def teeth_at_the_bound(folder):
-    return geojson(folder, comb_of(4_800))
+    return room_of(folder, comb_of(4_800))
 
 
 def too_many_teeth(folder):
-    return geojson(folder, comb_of(60_000))
+    return room_of(folder, comb_of(60_000))
 
 
 def most_values(folder):
     angles = np.linspace(0, 2 * np.pi, 990_000, endpoint=False)
     corners = np.round(np.stack([50 * np.cos(angles), 50 * np.sin(angles)], axis=1), 4)
-    return geojson(folder, corners.tolist())
+    return room_of(folder, corners.tolist())
 
 
 def native(folder, *parts):
@@ -185,18 +178,8 @@ def walls_of_sweet_home(folder):
 def crossing_walls(folder):
     """Write lines of walls, each of which crosses a quarter of the others."""
     ends = np.random.default_rng(0).random((2_400, 2, 2)).round(4) * 60
-    walls = [
-        {
-            "type": "Feature",
-            "properties": {"kind": "wall"},
-            "geometry": {"type": "LineString", "coordinates": line},
-        }
-        for line in ends.tolist()
-    ]
-    path = folder / "home.geojson"
-    content = {"type": "FeatureCollection", "units": "m", "features": walls}
-    path.write_text(json.dumps(content), encoding="utf-8")
-    return path
+    walls = [feature(line(*each), "wall") for each in ends.tolist()]
+    return write(folder, *walls, units="m")
 
 
 def crossing_parts(folder):

@@ -6,6 +6,13 @@ import sys
 import pytest
 from tests.thorough import THOROUGH
 
+import fleet2d
+from fleet2d.artifacts import store
+from fleet2d.bounds import Bound
+from fleet2d.errors import RunDirectoryError, ScenarioError
+from fleet2d.scenario.compose import compose
+from fleet2d.scenario.load import load_scenario
+
 SECONDS = 10
 MEGABYTES = 1000
 READ = """
@@ -94,38 +101,32 @@ def test_scenario_is_refused_within_seconds(tmp_path, name):
     assert megabytes < MEGABYTES
 
 
+def house(folder, members, more=""):
+    """Write a scenario with a household whose members have one persona of their own."""
+    names = [f"u{i}" for i in range(members)]
+    (folder / "own.yaml").write_text("extends: retired\npace: 0.9\n")
+    lines = "".join(f"  {name}: own.yaml\n" for name in names)
+    (folder / "house.yaml").write_text(f"members:\n{lines}")
+    text = "".join(f"  {name}: {{type: routine, household: house.yaml}}\n" for name in names)
+    (folder / "home.yaml").write_text(f"{BASE}users:\n{text}{more}")
+    return folder / "home.yaml"
+
+
 def test_a_household_is_read_once_for_all_its_members(tmp_path):
     """It was read and validated for each of them, which took a minute for some hundreds."""
-    from fleet2d.scenario.load import load_scenario
+    path = house(tmp_path, 20, "  bob: {type: routine, persona: own.yaml}\n")
 
-    names = [f"u{i}" for i in range(20)]
-    (tmp_path / "own.yaml").write_text("extends: retired\npace: 0.9\n")
-    members = "".join(f"  {name}: own.yaml\n" for name in names)
-    (tmp_path / "house.yaml").write_text(f"members:\n{members}")
-    text = "".join(f"  {name}: {{type: routine, household: house.yaml}}\n" for name in names)
-    (tmp_path / "home.yaml").write_text(
-        f"{BASE}users:\n{text}  bob: {{type: routine, persona: own.yaml}}\n"
-    )
+    users = load_scenario(path).users
 
-    users = load_scenario(tmp_path / "home.yaml").users
-
-    households = [users[name].behaviors[0].household for name in names]
+    households = [users[f"u{i}"].behaviors[0].household for i in range(20)]
     assert all(household is households[0] for household in households)
     assert 1 == len({id(persona) for persona in households[0].members.values()})
 
 
 def test_a_household_has_a_bound(tmp_path):
     """Each member is stored with all others in the manifest: 2,500 were too many to read again."""
-    from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.load import load_scenario
-
-    members = "".join(f"  u{i}: retired\n" for i in range(101))
-    (tmp_path / "house.yaml").write_text(f"members:\n{members}")
-    user = "users: {u0: {type: routine, household: house.yaml}}\n"
-    (tmp_path / "home.yaml").write_text(BASE + user)
-
     with pytest.raises(ScenarioError, match=r"household: the household has 101 members, and at mo"):
-        load_scenario(tmp_path / "home.yaml")
+        load_scenario(house(tmp_path, 101))
 
 
 def persona_files(folder, n):
@@ -138,9 +139,6 @@ def persona_files(folder, n):
 @pytest.mark.parametrize("persona", ["own0.yaml", f"{{extends: [{'retired, ' * 5000}retired]}}"])
 def test_a_persona_extends_a_bounded_number_of_files(tmp_path, persona):
     """Files that extend the next one twice were read for hours, 2,000 names for 9 s."""
-    from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.load import load_scenario
-
     persona_files(tmp_path, 40)
     text = f"{BASE}users: {{ana: {{type: routine, persona: {persona}}}}}\n"
     (tmp_path / "home.yaml").write_text(text)
@@ -149,22 +147,8 @@ def test_a_persona_extends_a_bounded_number_of_files(tmp_path, persona):
         load_scenario(tmp_path / "home.yaml")
 
 
-def house(folder, members):
-    """Write a scenario with a household whose members have one persona of their own."""
-    names = [f"u{i}" for i in range(members)]
-    (folder / "own.yaml").write_text("extends: retired\npace: 0.9\n")
-    lines = "".join(f"  {name}: own.yaml\n" for name in names)
-    (folder / "house.yaml").write_text(f"members:\n{lines}")
-    text = "".join(f"  {name}: {{type: routine, household: house.yaml}}\n" for name in names)
-    (folder / "home.yaml").write_text(f"{BASE}users:\n{text}")
-    return folder / "home.yaml"
-
-
 def test_personas_of_a_household_count_for_each_member(tmp_path):
     """A household of 100 had a manifest of 284 MB, which nothing could read; 24 of them, 20 GB."""
-    from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.load import load_scenario
-
     assert 20 == len(load_scenario(house(tmp_path, 20)).users) - 1  # and ana
     with pytest.raises(ScenarioError, match=r"FLEET2D_MAX_PERSONA_VALUES=\d+ in the") as caught:
         load_scenario(house(tmp_path, 100))
@@ -173,9 +157,6 @@ def test_personas_of_a_household_count_for_each_member(tmp_path):
 
 def test_long_texts_of_personas_count_for_each_user(tmp_path):
     """A text is stored for each user: 60 MB for 2,499 of them were 150 GB of a manifest."""
-    from fleet2d.errors import ScenarioError
-    from fleet2d.scenario.load import load_scenario
-
     (tmp_path / "own.yaml").write_text(f"extends: retired\nabout: {'x' * 10_000_000}\n")
     users = "".join(f"  u{i}: {{type: routine, persona: own.yaml}}\n" for i in range(20))
     (tmp_path / "home.yaml").write_text(f"{BASE}users:\n{users}")
@@ -186,11 +167,6 @@ def test_long_texts_of_personas_count_for_each_user(tmp_path):
 
 def test_no_run_begins_that_could_not_be_opened(tmp_path, monkeypatch):
     """It was simulated and stored whole, and then its manifest was too large to be read."""
-    import fleet2d
-    from fleet2d.artifacts import store
-    from fleet2d.bounds import Bound
-    from fleet2d.errors import RunDirectoryError
-
     monkeypatch.setattr(store, "FILE_BYTES", Bound("FILE_BYTES", 1000, "bytes"))
 
     with pytest.raises(RunDirectoryError, match=r"month/manifest\.json has \d+ bytes, and at most"):
@@ -200,8 +176,6 @@ def test_no_run_begins_that_could_not_be_opened(tmp_path, monkeypatch):
 
 def test_places_of_replaced_values_are_forgotten(tmp_path):
     """Messages name where a value is written now, not where one that it replaced was."""
-    from fleet2d.scenario.compose import compose
-
     (tmp_path / "a.yaml").write_text(
         "users:\n  ana:\n    type: meander\n    away:\n    - {from: 8:00}\n"
     )

@@ -8,7 +8,7 @@ and a forged record of a part deleted files elsewhere.
 import json
 import random
 import shutil
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pyarrow as pa
@@ -27,8 +27,6 @@ PLAN = "plan.parquet"
 PARQUET = (PLAN, "scenarios.parquet", "variants.parquet", RESULTS, TABLE)
 COMPARE = [{"metric": "sightings.ana", "against": {SPEED: 0.3}}]
 STUDY = small(replicates=2, keep={"tables": ["room_share"]}, compare=COMPARE)
-
-Damage = Callable[[Path], None]
 
 
 def _cut(path):
@@ -89,20 +87,20 @@ def _change_table(path, change):
     pq.write_table(change(pq.read_table(path)), path)
 
 
+def _filled(table, column):
+    """Return a table whose columns are all alike."""
+    filled = pa.table(dict.fromkeys(table.column_names, column))
+    return filled.replace_schema_metadata(table.schema.metadata)
+
+
 TABLES = {
     "no columns": lambda table: table.select([]),
     "first column only": lambda table: table.select([0]),
     "last column only": lambda table: table.select([table.num_columns - 1]),
     "no rows": lambda table: table.slice(0, 0),
-    "all text": lambda table: pa.table(
-        {name: ["\x1b[2J"] * table.num_rows for name in table.column_names}
-    ).replace_schema_metadata(table.schema.metadata),
-    "all lists": lambda table: pa.table(
-        {name: [[1]] * table.num_rows for name in table.column_names}
-    ).replace_schema_metadata(table.schema.metadata),
-    "all null": lambda table: pa.table(
-        {name: pa.nulls(table.num_rows) for name in table.column_names}
-    ).replace_schema_metadata(table.schema.metadata),
+    "all text": lambda table: _filled(table, ["\x1b[2J"] * table.num_rows),
+    "all lists": lambda table: _filled(table, [[1]] * table.num_rows),
+    "all null": lambda table: _filled(table, pa.nulls(table.num_rows)),
 }
 CASES = [
     *((file, name, damage) for file in (*JSON, *PARQUET) for name, damage in BYTES.items()),
@@ -124,12 +122,12 @@ CASES = [
         (
             file,
             f"number {number}",
-            lambda p, n=number: _change_table(p, lambda table: _with_number(table, n)),
+            partial(_change_table, change=partial(_with_number, number=number)),
         )
         for file in (PLAN, RESULTS)
         for number in (-5, 2**31 - 1)  # the former took another's place
     ),
-]  # type: ignore[misc]
+]
 
 
 @pytest.fixture(scope="module")
@@ -147,6 +145,13 @@ def study(whole, tmp_path):
 
 
 COMMANDS = (("status",), ("rerun", "1"), ("report",))
+
+
+def run_again(fleet2d, study, **changes):
+    """Run a study's file again, with changes to it, in the folder of its results."""
+    Path("study.yaml").write_text(yaml.safe_dump({**STUDY, **changes}, sort_keys=False))
+    arguments = ("--executor", "serial", "--quiet", "--out", str(study))
+    return fleet2d("study", "run", "study.yaml", *arguments)
 
 
 @pytest.mark.slow
@@ -176,10 +181,7 @@ OF_ITS_PLAN = [n for n, case in enumerate(CASES) if case[0] == PLAN and case[1] 
 def test_the_study_runs_again_or_says_why_not(study, fleet2d, number):
     file, _, damage = CASES[number]
     damage(next(study.glob(file)))
-    Path("study.yaml").write_text(yaml.safe_dump(STUDY, sort_keys=False))
-    code, out, err = fleet2d(
-        "study", "run", "study.yaml", "--executor", "serial", "--quiet", "--out", str(study)
-    )
+    code, out, err = run_again(fleet2d, study)
     assert "Traceback" not in err, err
     assert "\x1b" not in out + err
     assert code == 0 or err.startswith("error: "), (code, err)
@@ -215,9 +217,7 @@ def test_forged_names_of_files_delete_nothing(study, fleet2d, name):
     precious = study.parent / "precious"
     precious.write_text("keep")
     _forge(study / RESULTS, {"room_share": str(precious) if name.startswith("/") else name})
-    Path("study.yaml").write_text(yaml.safe_dump(STUDY, sort_keys=False))
-    arguments = ("--executor", "serial", "--quiet", "--out", str(study))
-    code, _, err = fleet2d("study", "run", "study.yaml", *arguments)
+    code, _, err = run_again(fleet2d, study)
     assert (0, "") == (code, err)  # the part is run again
     assert precious.read_text() == "keep"
     assert (study / "study.json").exists()
@@ -232,9 +232,7 @@ def test_nothing_is_written_through_a_link(study, fleet2d, link):
     if (study / link).is_dir():
         shutil.rmtree(study / link)
     (study / link).symlink_to(outside / "precious" if "." in link or link == "lock" else outside)
-    Path("study.yaml").write_text(yaml.safe_dump({**STUDY, "replicates": 3}, sort_keys=False))
-    arguments = ("--executor", "serial", "--quiet", "--out", str(study))
-    code, _, err = fleet2d("study", "run", "study.yaml", *arguments)
+    code, _, err = run_again(fleet2d, study, replicates=3)
     assert ["precious"] == [path.name for path in outside.iterdir()]
     assert (outside / "precious").read_text() == "keep"
     assert code == 0 or "is a link" in err
@@ -264,16 +262,8 @@ def test_a_damaged_search_is_refused_in_one_line(tmp_path, fleet2d, file, damage
     axes = {"radius": {"key": "robots.astro.radius", "values": [0.1, 0.15]}}
     study = small(axes=axes, replicates=1, tune=settings)
     Path("study.yaml").write_text(yaml.safe_dump(study, sort_keys=False))
-    arguments = (
-        "study",
-        "tune",
-        "study.yaml",
-        "--executor",
-        "serial",
-        "--quiet",
-        "--out",
-        "search",
-    )
+    options = ("--executor", "serial", "--quiet", "--out", "search")
+    arguments = ("study", "tune", "study.yaml", *options)
     assert fleet2d(*arguments)[0] == 0
     BYTES[damage](Path("search") / file)
     code, _, err = fleet2d(*arguments)

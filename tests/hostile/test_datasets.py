@@ -1,7 +1,6 @@
 """Data sets from somebody else: forged tables and manifests, links, pipes, names outside."""
 
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from tests.hostile.test_folders import attack, state_of
+from tests.hostile.test_folders import attack, link_to_file, pipe, state_of
 from tests.learning.datasets.small import made, make
 from tests.thorough import some
 
@@ -65,24 +64,12 @@ def link(path, elsewhere):
     path.symlink_to(elsewhere / path.name)
 
 
-def link_to_secret(path, elsewhere):
-    path.symlink_to(elsewhere / "secret.txt")
-
-
 def endless(path, _):
     path.symlink_to("/dev/zero")
 
 
-def pipe(path, _):
-    os.mkfifo(path)
-
-
-def folder(path, _):
-    path.mkdir()
-
-
 @pytest.mark.parametrize("use", USES)
-@pytest.mark.parametrize("trick", [link, link_to_secret, endless, pipe])
+@pytest.mark.parametrize("trick", [link, link_to_file, endless, pipe])
 @pytest.mark.parametrize("name", [MANIFEST, "train", "train/labels-00000.parquet"])
 def test_a_link_or_a_pipe_is_refused(copy, elsewhere, name, trick, use):
     target = copy / name

@@ -86,19 +86,23 @@ def act(verb, names, **fields):
     return st.fixed_dictionaries({verb: names}, optional=fields)
 
 
+def does(**fields):
+    return st.builds(dict, **fields)
+
+
+true = st.just(True)
 users, robots, bodies, places = (any_of(*names) for names in (USERS, ROBOTS, BODIES, PLACES))
 durations = any_of("1 s", "7 s", "3 min")
 lasting = {"duration": durations}
 AREA = [[3.0, 1.0], [5.0, 1.0], [5.0, 3.5], [3.0, 3.5]]
 KEYS = any_of({"dwell": "3 s"}, {"stay": "30 s"}, {"speed": 1.0}, {})
 ACTS = st.one_of(
-    st.builds(dict, put=bodies, to=places),
+    does(put=bodies, to=places),
     act("send", bodies, **lasting).flatmap(lambda a: places.map(lambda to: {**a, "to": to})),
     act("hold", bodies, **lasting),
     act("release", bodies),
     act("replan", bodies),
-    st.builds(
-        dict,
+    does(
         configure=robots,
         behavior=any_of("patrol", "follow"),
         keys=any_of({"cooldown": "1 min"}),
@@ -107,42 +111,42 @@ ACTS = st.one_of(
     act("away", users, **lasting),
     act("call_home", users, to=places, **lasting),
     act("guest", users, to=places, **lasting),
-    st.builds(dict, activity=users, what=any_of("wash", "breakfast", "read", "nap")),
-    st.builds(dict, activity=users, what=any_of("wash", "nap"), to=places),
-    st.builds(dict, call=robots, to=places),
-    st.builds(dict, call=robots, find=users),
-    st.builds(dict, call=robots, dock=st.just(True)),
-    st.builds(dict, battery=robots, charge=any_of(0.0, 0.01, 0.5, 1.0)),
-    st.builds(dict, switch_off=robots, camera=st.just(True), duration=durations),
-    st.builds(dict, switch_off=bodies, behavior=any_of("patrol", "dock", "follow", "schedule")),
-    st.builds(dict, switch_on=bodies, behavior=any_of("patrol", "dock", "follow", "schedule")),
-    st.builds(dict, fault=robots, wheels=st.just(True), duration=durations),
-    st.builds(dict, fault=robots, dark=st.just(True)),
-    st.builds(dict, fault=robots, detection=any_of("0 %", 0.3)),
+    does(activity=users, what=any_of("wash", "breakfast", "read", "nap")),
+    does(activity=users, what=any_of("wash", "nap"), to=places),
+    does(call=robots, to=places),
+    does(call=robots, find=users),
+    does(call=robots, dock=true),
+    does(battery=robots, charge=any_of(0.0, 0.01, 0.5, 1.0)),
+    does(switch_off=robots, camera=true, duration=durations),
+    does(switch_off=bodies, behavior=any_of("patrol", "dock", "follow", "schedule")),
+    does(switch_on=bodies, behavior=any_of("patrol", "dock", "follow", "schedule")),
+    does(fault=robots, wheels=true, duration=durations),
+    does(fault=robots, dark=true),
+    does(fault=robots, detection=any_of("0 %", 0.3)),
     act("restore", any_of(*ROBOTS, "motion", "share")),
-    st.builds(dict, suppress=robots, user=users, duration=durations),
-    st.builds(dict, mistake=robots, user=users, taken_for=any_of(*USERS, "unknown")),
-    st.builds(dict, inject=robots, user=any_of(*USERS, "unknown"), spot=any_of((1.0, 3.0))),
-    st.builds(dict, stick=any_of("motion"), says=any_of("on", "off", "silent")),
+    does(suppress=robots, user=users, duration=durations),
+    does(mistake=robots, user=users, taken_for=any_of(*USERS, "unknown")),
+    does(inject=robots, user=any_of(*USERS, "unknown"), spot=any_of((1.0, 3.0))),
+    does(stick=any_of("motion"), says=any_of("on", "off", "silent")),
     act("reset", any_of("share")),
-    st.builds(dict, replace=any_of("share"), frozen=st.just(True), duration=durations),
-    st.builds(dict, replace=any_of("share"), withheld=st.just(True)),
+    does(replace=any_of("share"), frozen=true, duration=durations),
+    does(replace=any_of("share"), withheld=true),
     act("open", any_of("bath_door")),
     act("shut", any_of("bath_door")),
     act("lock", any_of("bath_door")),
     act("unlock", any_of("bath_door")),
-    st.builds(dict, room=any_of("kitchen_1"), type=any_of("bathroom")),
-    st.builds(dict, hold=users, posture=any_of("lie", "sit"), duration=durations),
-    st.builds(dict, configure=robots, behavior=any_of("patrol", "come", "follow"), keys=KEYS),
-    st.builds(dict, lights=any_of("kitchen", "bedroom"), turn=any_of("on", "off")),
-    st.builds(dict, slow=any_of(AREA), speed=any_of(0.01, 0.4), duration=durations),
-    st.builds(dict, keep_out=robots, of=any_of("kitchen", "living_room"), duration=durations),
-    st.builds(dict, fault=robots, charger=st.just(True), duration=durations),
-    st.builds(dict, fault=robots, lost=st.just(True), duration=durations),
+    does(room=any_of("kitchen_1"), type=any_of("bathroom")),
+    does(hold=users, posture=any_of("lie", "sit"), duration=durations),
+    does(configure=robots, behavior=any_of("patrol", "come", "follow"), keys=KEYS),
+    does(lights=any_of("kitchen", "bedroom"), turn=any_of("on", "off")),
+    does(slow=any_of(AREA), speed=any_of(0.01, 0.4), duration=durations),
+    does(keep_out=robots, of=any_of("kitchen", "living_room"), duration=durations),
+    does(fault=robots, charger=true, duration=durations),
+    does(fault=robots, lost=true, duration=durations),
     act("kidnap", robots, to=places, **lasting),
     act("relocalize", robots),
     act("dismiss", robots),
-    st.builds(dict, report=any_of("motion"), says=any_of("on", "off")),
+    does(report=any_of("motion"), says=any_of("on", "off")),
 )
 WAITS = st.builds(
     lambda act, event, each, delay: {**act, "on": event, "each": each, "delay": delay},

@@ -134,11 +134,15 @@ def test_a_checkpoint_of_this_user_is_continued(folder):
     assert undisturbed(moved) == simulation.run().digest
 
 
+def flip_bit(path, at):
+    content = bytearray(path.read_bytes())
+    content[at] ^= 1
+    path.write_bytes(content)
+
+
 def change_byte(run):
     path = run / FOLDER / CHECKPOINT_NAME
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
+    flip_bit(path, path.stat().st_size // 2)
 
 
 def change_seal(run):
@@ -184,10 +188,7 @@ def copy_of_a_saved_simulation(run):
 
 
 def change_journal(run):
-    path = run / FOLDER / JOURNAL_NAME
-    content = bytearray(path.read_bytes())
-    content[200] ^= 1
-    path.write_bytes(content)
+    flip_bit(run / FOLDER / JOURNAL_NAME, 200)
 
 
 CHANGES = {

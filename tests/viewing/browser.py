@@ -1,10 +1,8 @@
 """A real browser, headless, for the tests of the page."""
 
 import os
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -18,7 +16,7 @@ READY = "html[data-ready=true], .failure"
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
+def chromium():
     """Start Chromium, or skip the test with a reason."""
     required = os.environ.get("FLEET2D_REQUIRE_BROWSER") == "1"
     if not CHROMIUM.exists():
@@ -35,11 +33,11 @@ def chromium() -> Iterator[Any]:
 
 
 @contextmanager
-def page_at(browser: Any, address: str, ready: str = READY, **options: Any) -> Iterator[Any]:
+def page_at(browser, address, ready=READY, **options):
     """Open a page, its lanes and paused if the address doesn't say; fail if it reports an error."""
     context = browser.new_context(**{"viewport": {"width": 1280, "height": 860}, **options})
     page = context.new_page()
-    errors: list[str] = []
+    errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(address if "#" in address else f"{address}#view=lanes&speed=60")
     page.wait_for_selector(ready, timeout=60_000, state="attached")

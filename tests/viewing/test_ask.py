@@ -1,13 +1,11 @@
 """Questions to the page, against the tables of the run evaluated step by step."""
 
-from collections.abc import Callable
 from datetime import timedelta
 
 import numpy as np
 import pytest
 
 import fleet2d
-from fleet2d.kernels import Bool
 
 from .browser import page_at
 from .test_browser import served

@@ -1,7 +1,5 @@
 """The page, driven in Chromium: what it shows is what the run's tables say."""
 
-import json
-import math
 import re
 import shutil
 from contextlib import contextmanager
@@ -14,7 +12,7 @@ from tests.thorough import THOROUGH
 
 import fleet2d
 from fleet2d.viewing.live import LiveRun
-from fleet2d.viewing.page_data import PageData, export_html
+from fleet2d.viewing.page_data import PageData, embedded_run, export_html, html_of
 from fleet2d.viewing.page_server import PageServer
 
 from .browser import page_at
@@ -178,8 +176,10 @@ def shows_step(page, step):
 def test_what_is_shown_at_random_moments_is_what_the_tables_say(page, run_dir):
     run = fleet2d.open_run(run_dir)
     paths = {name: run.path(name, timedelta(seconds=1)) for name in ("ana", "astro")}
+    seen = run.tables["observations"]["step"].to_pylist()
     count = 100 if THOROUGH else 12
-    for step in np.random.default_rng(5).choice(run.manifest["steps"], count).tolist():
+    random = np.random.default_rng(5).choice(run.manifest["steps"], count).tolist()
+    for step in [*random, seen[len(seen) // 2]]:
         go_to(page, f"step {step}")
         shows_step(page, step)
         for name, path in paths.items():
@@ -188,13 +188,6 @@ def test_what_is_shown_at_random_moments_is_what_the_tables_say(page, run_dir):
             assert path.y[step] == pytest.approx(float(row.get_attribute("data-y")), abs=1e-9)
             room = "away" if path.away[step] else run.plan.rooms[path.room[step]].name
             assert room == row.get_attribute("data-room")
-
-
-def test_observations_at_a_moment_are_those_of_the_table(page, run_dir):
-    table = fleet2d.open_run(run_dir).tables["observations"]
-    step = table["step"].to_pylist()[len(table) // 2]
-    go_to(page, f"step {step}")
-    shows_step(page, step)
     page.wait_for_selector("tr[data-body=astro] >> text=sees ana", timeout=5000)
 
 
@@ -572,13 +565,6 @@ def test_everything_that_is_shown_belongs_to_the_step_of_the_moment(browser, tmp
             page.wait_for_selector(f"[data-inspected=astro] >> text={place}")
 
 
-def test_click_on_a_body_shows_its_state_and_history(page):
-    page.click("tr[data-body=astro] button")
-    page.wait_for_selector("[data-inspected=astro]")
-    until(page, lambda: "patrol, hangout" in page.inner_text("[data-inspected=astro]"))
-    page.locator("[data-inspected=astro] ol.events li").nth(1).wait_for()
-
-
 def test_decision_behind_what_a_robot_does_is_shown(page, run_dir):
     page.click("tr[data-body=astro] button")
     events = fleet2d.open_run(run_dir).tables["events"].to_pylist()
@@ -690,30 +676,6 @@ def test_exported_file_plays_without_a_server(browser, run_dir, tmp_path):
         shows_step(page, 3600)
 
 
-@pytest.mark.slow
-def test_plan_of_4000_vertices_is_shown(browser, tmp_path):
-    turns = [2 * math.pi * i / 4000 for i in range(4000)]
-    far = [5 + 0.2 * (i * 7919 % 5) / 5 + math.sin(3 * turn) for i, turn in enumerate(turns)]
-    corners = [[8 + r * math.cos(a), 8 + r * math.sin(a)] for r, a in zip(far, turns, strict=True)]
-    plan = tmp_path / "round.json"
-    content = {"format": "fleet2d-floorplan", "version": 1, "free": [{"outline": corners}]}
-    plan.write_text(json.dumps(content))
-    run = fleet2d.run(
-        {
-            "simulation": {"start": "2026-01-05", "duration": "10 min", "seed": 1},
-            "floorplan": {"type": "native", "path": str(plan)},
-            "robots": {"astro": {"camera": {}, "behaviors": [{"type": "patrol"}]}},
-        }
-    )
-    with served(PageData(run)) as address, page_at(browser, address) as page:
-        page.keyboard.press("End")
-        shows_step(page, 599)
-        pictures = {page.locator(".plan canvas.top").screenshot()}
-        page.click("#tab-layers")
-        page.click("input[name=sight]")
-        add_new_picture(page, pictures)
-
-
 def test_damaged_run_is_explained_on_the_page(browser, tmp_path):
     (tmp_path / "manifest.json").write_text('{"format": 99}')
     with served(tmp_path) as address, page_at(browser, address) as page:
@@ -798,6 +760,23 @@ def test_moment_of_a_stored_run_is_continued_otherwise_beside_it(browser, run_di
     done = fleet2d.open_run(branch).manifest["interventions"]
     assert [("configure", at), ("send", at)] == [(act["do"], act["step"]) for act in done]
     assert fleet2d.reproduce(branch).same
+
+
+def test_page_works_in_the_frame_of_a_notebook(browser, run_dir):
+    """Jupyter and marimo show the page in a frame that may run scripts, and nothing else."""
+    document = html_of([embedded_run(PageData(fleet2d.open_run(run_dir)), 0, 9 * 3600)])
+    page = browser.new_page()
+    page.set_content('<iframe sandbox="allow-scripts" width="1000" height="800"></iframe>')
+    page.eval_on_selector("iframe", "(frame, text) => { frame.srcdoc = text; }", document)
+    frame = page.frame_locator("iframe")
+    for number, press in enumerate(("Enter", "Go"), start=4):
+        frame.locator("#goto").fill(f"day 1 0{number}:00")
+        if press == "Go":
+            frame.get_by_role("button", name="Go", exact=True).click()
+        else:
+            frame.locator("#goto").press(press)
+        frame.locator(f"table.now[data-step='{number * 3600}']").wait_for(timeout=20_000)
+    page.close()
 
 
 @pytest.mark.slow

@@ -78,14 +78,7 @@ def test_time_out_of_the_home_and_asleep_is_no_waking_time_at_home():
 
 
 def test_sentences_tell_how_people_answered(family):
-    kinds = Counter(
-        map(
-            tuple,
-            zip(
-                *(family.tables["events"][c].to_pylist() for c in ("event", "detail")), strict=True
-            ),
-        )
-    )
+    kinds = Counter((e["event"], e["detail"]) for e in family.tables["events"].to_pylist())
     pattern = r"Astro (reminded|greeted) (\w+) (once|(\d+) times) \((\w+)\): (.*)\."
     said = [found for s in demo.sentences(family) if (found := re.fullmatch(pattern, s))]
 

@@ -26,7 +26,7 @@ def test_moment_is_drawn_in_each_format(run_dir, tmp_path, ending):
 @pytest.mark.parametrize("kind", ["life", "heat", "strip"])
 def test_stretch_is_drawn_as_each_figure(run_dir, tmp_path, kind):
     target = tmp_path / f"{kind}.png"
-    draw_stretch(fleet2d.open_run(run_dir), 3600, 20_000, target, kind)  # type: ignore[arg-type]
+    draw_stretch(fleet2d.open_run(run_dir), 3600, 20_000, target, kind)
     assert target.stat().st_size > 10_000
 
 
@@ -91,23 +91,13 @@ def test_the_pictures_of_a_film_look_as_they_were_drawn(run_dir, tmp_path):
         for moment, pixels in draw_frames(stage, 25_200, np.flatnonzero(stage.changes()))
     }
     with av.open(str(target)) as film:
+        assert 1.2 == pytest.approx(film.duration / 1e6, abs=0.1)
         for picture in film.decode(video=0):
             moment = round(picture.time * 25)
             grey = picture.to_ndarray(format="rgb24").mean(axis=2)
             if moment in drawn:
                 assert np.sqrt(((grey - drawn.pop(moment)) ** 2).mean()) < 3
     assert not drawn
-
-
-@pytest.mark.slow
-def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir, tmp_path):
-    av = pytest.importorskip("av", reason="PyAV is not installed")
-    target = tmp_path / "film.mp4"
-    write_film(fleet2d.open_run(run_dir), target, 0, 7200, speed=600, height=240)
-    with av.open(str(target)) as film:
-        assert 12.0 == pytest.approx(film.duration / 1e6, abs=0.5)
-        frames = sum(1 for _ in film.decode(video=0))
-    assert frames < 12 * 25
 
 
 @pytest.mark.parametrize(
@@ -120,7 +110,7 @@ def test_film_lasts_as_long_as_its_stretch_at_its_speed(run_dir, tmp_path):
 )
 def test_impossible_film_is_refused(run_dir, tmp_path, name, options, words):
     with pytest.raises(InputError, match=words):
-        write_film(fleet2d.open_run(run_dir), tmp_path / name, 0, 100, **options)  # type: ignore[arg-type]
+        write_film(fleet2d.open_run(run_dir), tmp_path / name, 0, 100, **options)
 
 
 @pytest.mark.parametrize(

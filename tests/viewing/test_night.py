@@ -36,11 +36,6 @@ def room_of(run, name, step):
     return str(run.plan.rooms[run.path(name).room[step // 60]].name)
 
 
-def steps_of(run, activity):
-    rows = run.tables["events"].to_pylist()
-    return [r["step"] for r in rows if r["event"] == "activity" and r["detail"] == activity]
-
-
 def test_at_night_only_the_room_of_somebody_awake_is_bright():
     run = evening()
     step = 21 * HOUR

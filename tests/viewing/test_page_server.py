@@ -172,7 +172,8 @@ def test_sightings_cover_the_observations(run_dir):
 
 
 def test_random_walks_are_sent_as_positions(tmp_path):
-    run = fleet2d.run("bundled:paper", "simulation.duration=1 h", "users.ana={type: meander}")
+    alone = ("users.ana={type: meander}", "robots=null", "algorithms=null", "metrics=null")
+    run = fleet2d.run("bundled:paper", "simulation.duration=1 h", *alone)
     data = PageData(run)
     assert 1.0 == data.facts["walks_every_s"]
     poses = pq.read_table(data.table_path("poses"))

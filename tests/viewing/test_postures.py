@@ -49,16 +49,10 @@ def test_postures_are_the_true_ones_wherever_there_is_furniture_for_them(run):
     same = sum(count for (derived, true), count in pairs.items() if derived == true)
     assert pairs["sit", "sit"] > 1_000
     assert same > 0.99 * pairs.total(), pairs
-
-
-@pytest.mark.slow
-def test_postures_are_in_order_and_within_the_run(run):
-    table = postures_of(run, run.plan)
-    end = run.manifest["steps"] * run.manifest["step_us"]
     last = {}
-    for row in table.to_pylist():
-        assert last.get(row["user"], 0) <= row["time_us"] < row["end_us"] <= end
-        assert row["posture"] in ("sit", "lie")
+    for row in postures_of(run, run.plan).to_pylist():
+        end_us = run.manifest["steps"] * step_us
+        assert last.get(row["user"], 0) <= row["time_us"] < row["end_us"] <= end_us
         last[row["user"]] = row["end_us"]
     assert set(last) == set(run.manifest["entities"]["users"])
 
@@ -81,9 +75,8 @@ def test_who_gets_up_and_is_stopped_on_the_way_does_not_sit_until_then():
 
     table = postures_of(run, plan)
 
-    assert [(0, 60_000_000)] == list(
-        zip(table["time_us"].to_pylist(), table["end_us"].to_pylist(), strict=True)
-    )
+    (row,) = table.to_pylist()
+    assert (0, 60_000_000) == (row["time_us"], row["end_us"])
 
 
 def test_people_sit_at_the_same_steps_in_a_home_with_a_time_zone(tmp_path):

@@ -17,21 +17,29 @@ from fleet2d.viewing.run_notes import checked_notes, read_notes, write_notes
 from fleet2d.viewing.served_runs import ServedRuns
 
 OWN = "http://127.0.0.1:8765"
+HEADERS = {"Origin": OWN, "Content-Type": "application/json"}
 
 
-def test_notes_are_kept_beside_the_run_and_not_in_it(run_dir, tmp_path):
-    root = Path(shutil.copytree(run_dir, tmp_path / "day"))
-    client = TestClient(page_app(ServedRuns([root]), "token", 8765), base_url=f"{OWN}/token/")
-    headers = {"Origin": OWN, "Content-Type": "application/json"}
+@pytest.fixture
+def root(run_dir, tmp_path):
+    return Path(shutil.copytree(run_dir, tmp_path / "day"))
+
+
+@pytest.fixture
+def client(root):
+    return TestClient(page_app(ServedRuns([root]), "token", 8765), base_url=f"{OWN}/token/")
+
+
+def test_notes_are_kept_beside_the_run_and_not_in_it(root, client, tmp_path):
     notes = [{"step": 900, "text": "why here? ünïcode <b>"}, {"step": 60, "text": ""}]
-    answer = client.post("run/0/notes", content=json.dumps(notes), headers=headers)
+    answer = client.post("run/0/notes", content=json.dumps(notes), headers=HEADERS)
     assert [60, 900] == [note["step"] for note in answer.json()]
     assert client.get("run/0/notes.json").json() == answer.json()
     assert (tmp_path / "day.notes.json").is_file()
     seal = verify_run(root)
     assert ({}, []) == (seal.differing, seal.foreign)
     assert client.post("run/0/notes", content="[]", headers={"Origin": OWN}).status_code == 415
-    foreign = {**headers, "Origin": "http://evil.example"}
+    foreign = {**HEADERS, "Origin": "http://evil.example"}
     assert client.post("run/0/notes", content="[]", headers=foreign).status_code == 403
     assert read_notes(fleet2d.open_run(root)) == answer.json()
 
@@ -62,28 +70,24 @@ def test_run_in_memory_has_no_notes_and_says_why():
         write_notes(run, b"[]")
 
 
-def test_damaged_file_of_notes_is_named(run_dir, tmp_path):
-    root = Path(shutil.copytree(run_dir, tmp_path / "day"))
+def test_damaged_file_of_notes_is_named(root, tmp_path):
     (tmp_path / "day.notes.json").write_text("{")
     with pytest.raises(InputError, match=r"day\.notes\.json can't be read"):
         read_notes(fleet2d.open_run(root))
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link"])
-def test_a_pipe_or_a_link_in_place_of_notes_is_refused_by_the_page(run_dir, tmp_path, kind):
+def test_a_pipe_or_a_link_in_place_of_notes_is_refused_by_the_page(client, tmp_path, kind):
     """The request for notes waited for the pipe for ever."""
-    root = Path(shutil.copytree(run_dir, tmp_path / "day"))
     (tmp_path / "secret.json").write_text('[{"step": 1, "text": "secret"}]')
     if kind == "pipe":
         os.mkfifo(tmp_path / "day.notes.json")
     else:
         (tmp_path / "day.notes.json").symlink_to("secret.json")
-    client = TestClient(page_app(ServedRuns([root]), "token", 8765), base_url=f"{OWN}/token/")
-    headers = {"Origin": OWN, "Content-Type": "application/json"}
 
     for answer in (
         client.get("run/0/notes.json"),
-        client.post("run/0/notes", content="[]", headers=headers),
+        client.post("run/0/notes", content="[]", headers=HEADERS),
     ):
         assert answer.status_code == 422
         message = answer.json()["message"]

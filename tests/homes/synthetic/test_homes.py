@@ -13,6 +13,8 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.homes.synthetic.generator import (
     MAX_CORRIDOR_SHARE,
     generate,
+    outline_corners,
+    outline_kind,
 )
 from fleet2d.homes.synthetic.program import SIZES, Style, Wishes
 from fleet2d.homes.synthetic.slicing import boxes_overlap
@@ -101,6 +103,13 @@ def test_area_and_rooms_are_as_requested(area, bedrooms, bathrooms):
         assert area == pytest.approx(plan.area_m2, rel=0.05)
         assert (bedrooms, bathrooms) == (types.count("bedroom"), types.count("bathroom"))
         assert {"living_room", "kitchen"} <= {label for room in plan.rooms for label in room.labels}
+
+
+@pytest.mark.parametrize("outline", ["rectangle", "L", "T", "U"])
+def test_outline_is_the_requested_one(outline):
+    for seed in range(6):
+        house = generate(seed, Wishes(area_m2=140, bedrooms=3), Style(outline=outline))
+        assert outline == outline_kind(outline_corners(house.boxes))
 
 
 def test_widths_and_open_plan_are_as_requested():

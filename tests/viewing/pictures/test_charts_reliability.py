@@ -71,6 +71,13 @@ def figure(monkeypatch):
     return result
 
 
+def test_both_panels_have_their_probabilities_at_the_same_places(figure, tmp_path):
+    charts.draw_forecasts("rtp", np.eye(3), np.arange(3), tmp_path / "x.png")
+    figure.draw_without_rendering()
+    curve, counts = (axes.get_window_extent().intervalx for axes in figure.axes)
+    np.testing.assert_allclose(curve, counts)
+
+
 def test_gaps_have_a_panel_for_each_measure_and_a_line_for_each_model(figure, tmp_path):
     gaps = {"0-1 min": (0.5, 0.4, 0.7), "over 4 h": (0.9, math.nan, math.nan)}
     charts.draw_gaps({"log loss": {"routine": gaps, "learned": gaps}}, tmp_path / "x.png")

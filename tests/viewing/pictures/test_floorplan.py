@@ -1,4 +1,3 @@
-import builtins
 import importlib
 import sys
 
@@ -23,16 +22,21 @@ def home():
     return load_floorplan()
 
 
-def pixels(plan, *places, **options):
-    """Draw a plan and return the colours (r, g, b) at places [m]."""
+def painted(draw, *places):
+    """Draw on axes, and return the colours (r, g, b) at places [m]."""
     figure = Figure(figsize=(8, 8), dpi=100)
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
-    floorplan_axes(plan, axes, **options)
+    draw(axes)
     canvas.draw()
     image = np.asarray(canvas.buffer_rgba())[::-1, :, :3] / 255
     at = axes.transData.transform(np.array(places)).astype(int)
     return [image[y, x].tolist() for x, y in at]
+
+
+def pixels(plan, *places, **options):
+    """Draw a plan and return the colours (r, g, b) at places [m]."""
+    return painted(lambda axes: floorplan_axes(plan, axes, **options), *places)
 
 
 @pytest.mark.slow
@@ -111,8 +115,8 @@ def test_rooms_too_small_for_their_name_show_their_number():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", ["13f8", "1bb5", "2953", "69c2", "f1ac"])
-def test_empty_tiny_long_slanted_and_large_plans_are_drawn(shared_data, tmp_path, start):
+@pytest.mark.parametrize("start", ["1bb5", "69c2", "f1ac"])
+def test_odd_and_large_plans_are_drawn(shared_data, tmp_path, start):
     (path,) = (shared_data / "houseexpo").glob(f"{start}*.json")
 
     draw_floorplan(load_floorplan(path, 0.2), tmp_path / "plan.png")
@@ -138,14 +142,7 @@ def test_a_place_that_cannot_be_written_is_refused(home, tmp_path):
 
 
 def test_without_matplotlib_the_extra_is_named(monkeypatch):
-    real = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name.partition(".")[0] == "matplotlib":
-            raise ModuleNotFoundError(name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     for module in [name for name in sys.modules if name.startswith("fleet2d.viewing.pictures")]:
         monkeypatch.delitem(sys.modules, module)
 

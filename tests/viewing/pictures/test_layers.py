@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from tests.scenes import flat_path, run, scenario
+from tests.thorough import some
+from tests.viewing.pictures.test_floorplan import painted
 
 import fleet2d
 from fleet2d.errors import ArtifactError, InputError
@@ -25,24 +25,19 @@ def layer_run():
 
 def colors(plan, values, *places):
     """Draw a layer, or none, and return the colours at places [m]."""
-    figure = Figure(figsize=(8, 8), dpi=100)
-    canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0, 0, 1, 1))
-    floorplan_axes(plan, axes, names=False, title=False)
-    if values is not None:
-        layer_on_axes(plan, values, axes)
-    canvas.draw()
-    image = np.asarray(canvas.buffer_rgba())[::-1, :, :3] / 255
-    at = axes.transData.transform(np.array(places)).astype(int)
-    return [tuple(image[y, x].round(3).tolist()) for x, y in at]
+
+    def draw(axes):
+        floorplan_axes(plan, axes, names=False, title=False)
+        if values is not None:
+            layer_on_axes(plan, values, axes)
+
+    return painted(draw, *places)
 
 
-@pytest.mark.parametrize("dtype", [np.bool_, np.int64, np.float64])
-def test_only_cells_with_a_value_are_coloured(dtype):
+@pytest.mark.parametrize("nothing", [False, -1, np.nan])
+def test_only_cells_with_a_value_are_coloured(nothing):
     plan = fleet2d.load_floorplan(flat_path())
-    values = np.full(plan.free.shape, {"b": 0, "i": -1, "f": np.nan}[np.dtype(dtype).kind]).astype(
-        dtype
-    )
+    values = np.full(plan.free.shape, nothing)
     kitchen = plan.room_of_cell == plan.room("kitchen_1").index
     values[kitchen] = 1
     places = ((7.0, 1.0), (1.0, 2.5), (-0.05, 2.0))
@@ -63,6 +58,21 @@ def test_larger_values_have_another_colour():
     assert left != right
 
 
+@pytest.mark.slow
+def test_png_and_svg_are_written_the_same_twice(layer_run, tmp_path):
+    cases = [
+        (name, ending)
+        for name in ("dust", "explored.astro", "last_seen.astro")
+        for ending in STARTS
+    ]
+    for name, ending in some(cases, 3):
+        first, second = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
+        draw_layer(layer_run, name, first)
+        draw_layer(layer_run, name, second)
+        assert first.read_bytes().startswith(STARTS[ending])
+        assert first.read_bytes() == second.read_bytes()
+
+
 def test_what_cannot_be_drawn_is_an_error_that_says_why(layer_run, tmp_path):
     with pytest.raises(ArtifactError, match="stored no layer 'mud'"):
         draw_layer(layer_run, "mud", tmp_path / "a.png")
@@ -71,3 +81,6 @@ def test_what_cannot_be_drawn_is_an_error_that_says_why(layer_run, tmp_path):
     with pytest.raises(InputError, match=r"not as '\.gif'"):
         draw_layer(layer_run, "dust", tmp_path / "a.gif")
     assert [] == list(tmp_path.iterdir())
+
+
+STARTS = {".png": b"\x89PNG", ".svg": b"<?xml"}

@@ -1,10 +1,8 @@
 """Pictures of fields of view, and how poses are parsed."""
 
-import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from tests.scenes import flat_path
+from tests.viewing.pictures.test_floorplan import painted
 
 import fleet2d
 from fleet2d.errors import InputError, PlacementError
@@ -40,23 +38,26 @@ def test_other_pose_is_an_error_that_says_how_it_is_written(text):
 def test_both_panels_show_what_is_in_view_and_only_that(plan):
     pose, inside, behind = CameraPose(2.5, 2.5, 0.0, 6.0, 90.0), (4.5, 3.0), (1.0, 2.5)
     hidden = (7.0, 0.5)  # the wall with the door is in the way
-    colors = []
-    for panel in ("none", "region", "cells"):
-        figure = Figure(figsize=(8, 8), dpi=100)
-        canvas = FigureCanvasAgg(figure)
-        axes = figure.add_axes((0, 0, 1, 1))
-        if panel == "region":
-            region_panel(plan, pose, axes, "")
-        else:
-            panel_pose = pose if panel == "cells" else pose._replace(far=0.01)
-            cells_panel(plan, panel_pose, axes, Flashlight(), "")
-        canvas.draw()
-        image = np.asarray(canvas.buffer_rgba())[::-1, :, :3]
-        pixels = axes.transData.transform(np.array([inside, behind, hidden])).astype(int)
-        colors.append([image[y, x].tolist() for x, y in pixels])
-    for panel_colors in colors[1:]:
-        assert colors[0][0] != panel_colors[0]
-        assert colors[0][1:] == panel_colors[1:]
+    places = (inside, behind, hidden)
+    empty, region, cells = (
+        painted(
+            lambda axes: cells_panel(plan, pose._replace(far=0.01), axes, Flashlight(), ""), *places
+        ),
+        painted(lambda axes: region_panel(plan, pose, axes, ""), *places),
+        painted(lambda axes: cells_panel(plan, pose, axes, Flashlight(), ""), *places),
+    )
+    for panel_colors in (region, cells):
+        assert empty[0] != panel_colors[0]
+        assert empty[1:] == panel_colors[1:]
+
+
+@pytest.mark.slow
+def test_pictures_are_written_the_same_twice(plan, tmp_path):
+    for ending in (".png", ".svg"):
+        files = [tmp_path / f"{n}{ending}" for n in "ab"]
+        for file in files:
+            draw_fov(plan, CameraPose(2.5, 2.5, 30.0), file)
+        assert files[0].read_bytes() == files[1].read_bytes()
 
 
 def test_pose_in_a_wall_or_a_wrong_ending_writes_nothing(plan, tmp_path):
