@@ -265,10 +265,8 @@ def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda m: m.update(steps="many"), ["steps", "'many'"]),
         (lambda m: m.update(steps=-1), ["steps", "-1"]),
         (lambda m: m.update(status="fine"), ["status", "'complete'", "'fine'"]),
-        (lambda m: m.update(start="yesterday"), ["start", "'yesterday'"]),
         (lambda m: m.update(stats="complete"), ["stats", "did you mean 'status'?"]),
         (lambda m: m.pop("scenario"), ["lacks scenario"]),
         (lambda m: m["tables"].update({"../../etc/x": {"rows": 0}}), ["tables.../../etc/x"]),
@@ -276,17 +274,14 @@ def test_an_unfinished_run_has_nothing_to_compare_with(tmp_path):
         (lambda m: m["inputs"].append("/dev/zero"), ["inputs.0", "/dev/zero"]),
         (lambda m: m["seal"]["files"].update({"../x": {"bytes": 1, "sha256": "0" * 64}}), ["seal.files.../x"]),
         (lambda m: m.update(notes=[["x" * 10_000]]), ["notes.0", "…"]),
-        (lambda m: m.update(digest="abc"), ["digest", "'abc'"]),
         # Pages, reports and pictures read these; they ended in tracebacks.
         (lambda m: m.update(step_us=0), ["step_us is 0"]),
         (lambda m: m.update(start=""), ["start is empty"]),
         (lambda m: m.update(start="2026-01-05T00:00:00+01:00"), ["start", "without a time zone"]),
         (lambda m: m.update(steps=10**15), ["end after the year 9999"]),
         (lambda m: m["scenario"]["users"]["ana"].update(radius=[0.2]), ["scenario.users.ana.radius"]),
-        (lambda m: m["scenario"]["robots"]["astro"]["camera"].update(range=[1]), ["robots.astro.camera.range"]),
         (lambda m: m["scenario"]["robots"]["astro"]["camera"].update(angle_deg=1e9), ["camera.angle_deg"]),
         (lambda m: m["scenario"]["robots"]["astro"].update(behaviors=[["patrol"]]), ["astro.behaviors.0"]),
-        (lambda m: m.update(interventions=[{"do": "put", "step": "3"}]), ["interventions.0.step"]),
         (lambda m: m.update(expectations={"quiet": {}}), ["expectations.quiet.expectation"]),
     ],
 )  # fmt: skip

@@ -85,8 +85,7 @@ def write_life(folder: Path, days=24, weekend=True) -> Path:
 
 
 def timeline_of(path: Path) -> Timeline:
-    log = read_log(path)
-    return read_timeline(log)
+    return read_timeline(read_log(path))
 
 
 @pytest.fixture(scope="module")

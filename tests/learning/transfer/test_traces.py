@@ -21,8 +21,7 @@ from fleet2d.logs.layout import read_log
 
 
 def trace_of(path: Path) -> MinuteTrace:
-    log = read_log(path)
-    return trace_of_log(log, {}, {})
+    return trace_of_log(read_log(path), {}, {})
 
 
 @pytest.fixture
