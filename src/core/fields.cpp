@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <functional>
 #include <limits>
-#include <queue>
 #include <stdexcept>
 #include <vector>
 
@@ -147,8 +145,44 @@ struct ReachedCell {
     i64 bound;      // of the cost of a path through it
     i64 travelled;  // the cost from the goal
     GridCell cell;
+};
 
-    bool operator>(const ReachedCell& other) const { return bound > other.bound; }
+// The reached cells from which a search goes on, the lowest bounds first; among bounds that differ by less than WIDTH
+// in any order. None is pushed with a lower bound than the last that was popped, or one more than a step higher.
+class WaitingCells {
+public:
+    explicit WaitingCells(i64 bound) : lowest_(bound / WIDTH) {}
+
+    void push(const ReachedCell& reached) {
+        buckets_[number_of(reached.bound / WIDTH)].push_back(reached);
+        ++size_;
+    }
+
+    // Whether a cell waits whose bound may be so high at most.
+    bool has_one_below(i64 bound) {
+        if (size_ == 0) return false;
+        while (buckets_[number_of(lowest_)].empty()) ++lowest_;
+        return lowest_ * WIDTH <= bound;
+    }
+
+    ReachedCell pop() {
+        auto& cells = buckets_[number_of(lowest_)];
+        const ReachedCell reached = cells.back();
+        cells.pop_back();
+        --size_;
+        return reached;
+    }
+
+private:
+    static constexpr i64 WIDTH = FREE_COST;
+    static constexpr std::size_t BUCKETS = 128;
+    static_assert(ACROSS * (FREE_COST + 2 * MAX_COST) + ACROSS * FREE_COST < WIDTH * (static_cast<i64>(BUCKETS) - 1));
+
+    static std::size_t number_of(i64 bucket) { return static_cast<std::size_t>(bucket) % BUCKETS; }
+
+    std::array<std::vector<ReachedCell>, BUCKETS> buckets_;
+    i64 lowest_;
+    i64 size_ = 0;
 };
 
 // The steps to the eight neighbors, row by row.
@@ -271,19 +305,20 @@ Array<i64, 2> cheapest_cells(View<const i32, 2> cost, GridCell start, GridCell g
     if (at(cost, goal) < 0) return way;
     auto distances = Array<i64, 2>::filled(cost.shape, -1);
     const View<i64, 2> distance = distances;
-    std::priority_queue<ReachedCell, std::vector<ReachedCell>, std::greater<>> waiting;
+    const auto least_from = [&](GridCell cell) {
+        const i64 rows = std::abs(cell.row - start.row), columns = std::abs(cell.column - start.column);
+        return FREE_COST * (STRAIGHT * std::max(rows, columns) + (ACROSS - STRAIGHT) * std::min(rows, columns));
+    };
+    WaitingCells waiting(least_from(goal));
     const auto reach = [&](GridCell cell, i64 travelled) {
         at(distance, cell) = travelled;
-        const i64 rows = std::abs(cell.row - start.row), columns = std::abs(cell.column - start.column);
-        const i64 least = STRAIGHT * std::max(rows, columns) + (ACROSS - STRAIGHT) * std::min(rows, columns);
-        waiting.push({travelled + FREE_COST * least, travelled, cell});
+        waiting.push({travelled + least_from(cell), travelled, cell});
     };
     reach(goal, 0);
     // Until all cells of all cheapest paths are known.
-    for (i64 cheapest = std::numeric_limits<i64>::max(); !waiting.empty() && waiting.top().bound <= cheapest;) {
-        const auto [bound, travelled, cell] = waiting.top();
-        waiting.pop();
-        if (at(distance, cell) != travelled) continue;  // a cheaper path was found since
+    for (i64 cheapest = std::numeric_limits<i64>::max(); waiting.has_one_below(cheapest);) {
+        const auto [bound, travelled, cell] = waiting.pop();
+        if (bound > cheapest || at(distance, cell) != travelled) continue;  // a cheaper path was found since
         if (cell == start) cheapest = travelled;
         for (const GridCell step : NEIGHBORS) {
             const GridCell beside = cell + step;

@@ -190,7 +190,8 @@ def route_by_cost(
     if part < 0:
         return None
     cells = space.part_of_cell == part
-    costs = np.where(cells, cost.clip(CLOSED, MAX_COST), CLOSED).astype(np.int32, copy=False)
+    limited = np.maximum(np.minimum(cost, MAX_COST), CLOSED)  # faster than `clip`
+    costs = np.where(cells, limited, CLOSED).astype(np.int32, copy=False)
     last = _nearest(space, costs >= 0, goal)
     if cost[goal[1] // SUB, goal[0] // SUB] < 0 or last is None:
         return None
