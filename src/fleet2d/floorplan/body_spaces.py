@@ -7,7 +7,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from fleet2d.floorplan.home import lattice_footprint
+from fleet2d.floorplan.home import lattice_footprints
 from fleet2d.floorplan.mesh import GRID
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
@@ -134,7 +134,7 @@ def body_spaces(plan: FloorPlan, widest: list[Polygon]) -> list[BodySpace]:
 
 def solid_footprints(plan: FloorPlan, things: Iterable[PlacedObject]) -> list[Polygon]:
     """Return the footprints of the objects that bodies can't pass [lattice]."""
-    return [lattice_footprint(plan, thing) for thing in things if thing.blocks != "nothing"]
+    return lattice_footprints(plan, [thing for thing in things if thing.blocks != "nothing"])
 
 
 def exact_space(plan: FloorPlan, solid: Sequence[Polygon], radius: float) -> list[Polygon]:

@@ -320,7 +320,7 @@ class _Shapes:
         plan = self.plan
         polygons = plan.sight_polygons if glass else plan.polygons
         if tall:
-            blocks = shapely.union_all([lattice_footprint(plan, thing) for thing in tall])
+            blocks = shapely.union_all(lattice_footprints(plan, tall))
             rest = shapely.get_parts(shapely.difference(shapely.MultiPolygon(polygons), blocks))
             polygons = [part for shape in rest.tolist() for part in snap_polygon(shape).polygons]
         if not polygons:
@@ -344,7 +344,7 @@ class _Shapes:
         def shape() -> SpaceShape:
             rooms = [self.plan.room_of_cell == room for room in sorted(without) if room >= 0]
             obstacles = [
-                *(lattice_footprint(self.plan, thing) for thing in solid),
+                *lattice_footprints(self.plan, solid),
                 *(shape for room in rooms for shape in cell_polygons(room)),
                 *(self.areas[-1 - area] for area in without if area < 0),
             ]
@@ -371,7 +371,13 @@ def _shapes_of(plan: FloorPlan, door_lines: Sequence[Segment]) -> _Shapes:
 
 def lattice_footprint(plan: FloorPlan, thing: PlacedObject) -> Polygon:
     """Return the floor that an object covers [lattice], on even units as walls are."""
-    return Polygon(plan.lattice.to_walls(np.asarray(thing.footprint.exterior.coords)[:-1]))
+    return lattice_footprints(plan, [thing])[0]
+
+
+def lattice_footprints(plan: FloorPlan, things: Sequence[PlacedObject]) -> list[Polygon]:
+    """Return the floors that objects cover, as `lattice_footprint` does."""
+    shapes = np.array([thing.footprint for thing in things], np.object_)
+    return shapely.transform(shapes, lambda xy: plan.lattice.to_walls(xy).astype(float)).tolist()
 
 
 def _tall(objects: tuple[PlacedObject, ...]) -> tuple[PlacedObject, ...]:
