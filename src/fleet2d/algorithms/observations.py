@@ -87,8 +87,7 @@ class SightingTable:
         index = self.index[part]
         distinct = self.distinct
         if len(index) < len(distinct):
-            is_used = np.zeros(len(distinct), np.bool_)
-            is_used[index] = True
+            is_used = np.bincount(index, minlength=len(distinct)) > 0
             index = (np.cumsum(is_used, dtype=np.int32) - 1)[index]
             distinct = distinct[is_used]
         return SightingTable(self.step[part], index, distinct)

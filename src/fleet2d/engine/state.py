@@ -365,8 +365,8 @@ class State:
         first = self.settled
         if first >= end:
             return
-        rows = range(len(self.actors))
-        self.events.emit([event for row in rows for event in self._due_notes(row, end - 1)])
+        for row in range(len(self.actors)):
+            self.events.emit(self._due_notes(row, end - 1))
         for watcher in self.watchers:
             self.take(watcher, end)
         observations = self._observations()
@@ -384,12 +384,13 @@ class State:
     def _readings(self) -> Sequence[SensorRow]:
         """Return the readings of sensors since the last call, and pass them on as events."""
         sensors = self.find(Sensors)
-        readings = () if sensors is None else sensors.collect()
-        if sensors is not None and readings:
-            events = sensors.events_of(readings)
-            self.events.keep(events)
-            if EventKind.SENSOR in self.awaited:
-                self.interventions.take_events(events)
+        if sensors is None:
+            return ()
+        readings = sensors.collect()
+        events = sensors.events_of(readings)
+        self.events.keep(events)
+        if EventKind.SENSOR in self.awaited:
+            self.interventions.take_events(events)
         return readings
 
     def count_looks(self) -> None:
