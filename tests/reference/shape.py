@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 
 from fleet2d.floorplan.rooms.shape import (
+    ACROSS_SHARE,
     ARM_M2,
     ARM_SHARE,
     FINE,
@@ -26,16 +27,19 @@ def parts_by_shape(room_of_cell, cell, limits):
     part = {at: top_above(at, rooms, height) for at in rooms}
     scale = FINE * (2 * reach + 1) ** 2
     part |= arms(part, height, cell, scale)
+    level = []
+    for pair, highest in highest_passes(part, rooms, height).items():
+        tops = [max(1, *(height[at] for at in part if part[at] == top)) for top in pair]
+        if highest >= ACROSS_SHARE * max(tops):
+            level.append(pair)
+    joined_to = {top: top for top in part.values()}
+    for one, other in level:
+        kept, lost = sorted((joined_to[one], joined_to[other]))
+        joined_to = {top: kept if to == lost else to for top, to in joined_to.items()}
+    part = {at: joined_to[top] for at, top in part.items()}
     while True:
-        passes = {}
-        for (row, column), top in part.items():
-            for beside in ((row, column + 1), (row + 1, column)):
-                if part.get(beside, top) != top and rooms[beside] == rooms[row, column]:
-                    pair = (min(top, part[beside]), max(top, part[beside]))
-                    lower = min(height[row, column], height[beside])
-                    passes[pair] = max(passes.get(pair, 0), lower)
         joined = []
-        for pair, highest in passes.items():
+        for pair, highest in highest_passes(part, rooms, height).items():
             sides = [[at for at in part if part[at] == top] for top in pair]
             tops = [max(1, *(height[at] for at in side)) for side in sides]
             low, high = sorted((0, 1), key=tops.__getitem__)
@@ -49,6 +53,18 @@ def parts_by_shape(room_of_cell, cell, limits):
             return {frozenset(at for at in part if part[at] == top) for top in part.values()}
         _, kept, lost = min(joined)
         part = {at: kept if top == lost else top for at, top in part.items()}
+
+
+def highest_passes(part, rooms, height):
+    """Return the height of the highest pass between any two parts that meet within a room."""
+    passes = {}
+    for (row, column), top in part.items():
+        for beside in ((row, column + 1), (row + 1, column)):
+            if part.get(beside, top) != top and rooms[beside] == rooms[row, column]:
+                pair = (min(top, part[beside]), max(top, part[beside]))
+                lower = min(height[row, column], height[beside])
+                passes[pair] = max(passes.get(pair, 0), lower)
+    return passes
 
 
 def arms(part, height, cell, scale):

@@ -53,6 +53,9 @@ ARM_M2 = 1.2
 """An arm of a space is at most this share as wide, and at least this large [m²]."""
 LONG = 3
 """A corridor is at least this many times as long as wide."""
+ACROSS_SHARE = 0.85
+"""A place that is at least this share as wide as the space on both sides lies across a corridor,
+which goes on there, around a block too."""
 FURNITURE_M2 = 0.4
 WALL_M = 1.2
 """Free-standing obstacles up to this size and shorter than this, such as chairs or a small table,
@@ -91,6 +94,9 @@ def find_hills(room_of_cell: I64, cell: float) -> tuple[I32, "Hills"]:
     height = _heights(without_furniture(rooms, cell), reach)
     scale = FINE * (2 * reach + 1) ** 2
     hill = _with_arms(climb(rooms, height), height, cell, scale)
+    hills = Hills.of(hill, rooms, height, scale)
+    # These are joined before any becomes part of a hall, beside which the others would seem narrow.
+    hill = hills.joined_across()[hill]
     return hill, Hills.of(hill, rooms, height, scale)
 
 
@@ -200,6 +206,18 @@ class Hills:
         """Note a pass between two hills; the highest counts."""
         highest = max(height, self.passes[one].get(other, 0))
         self.passes[one][other] = self.passes[other][one] = highest
+
+    def joined_across(self) -> I32:
+        """Return the first of the hills that are one corridor with each, and -1 for -1."""
+        first = np.arange(len(self.tops) + 1, dtype=np.int32)
+        first[-1] = -1
+        for one, others in enumerate(self.passes):
+            for other, height in others.items():
+                highest = max(self.tops[one], self.tops[other])
+                if one < other and height >= ACROSS_SHARE * highest:
+                    low, high = sorted((first[one], first[other]))
+                    first[first == high] = low
+        return first
 
     def is_long(self, hill: int) -> bool:
         """Return whether a hill is several times as long as wide, like a corridor."""
