@@ -469,7 +469,9 @@ def divide(
     chambers = cut_chambers(lattice, polygons, mesh, free, passages.segments)
     if kind == "boxes":
         return label_rooms(lattice, free, regions, chambers, passages)
-    rooms = segment_rooms(chambers, passages.is_opening, passages.widths_m, lattice.cell)
+    rooms = segment_rooms(
+        chambers, passages.segments, passages.is_opening, passages.widths_m, lattice.cell
+    )
     return number_rooms(lattice, divide_by_shape(rooms, lattice.cell, IN_STRAIGHT_WALLS))
 
 

@@ -20,10 +20,10 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from fleet2d.floorplan.lattice import Lattice
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
 from fleet2d.floorplan.rooms.doorways import MIN_APART_M
-from fleet2d.floorplan.rooms.shape import LONG, by_size, without_furniture
+from fleet2d.floorplan.rooms.shape import ACROSS_SHARE, LONG, by_size, without_furniture
 from fleet2d.kernels import (
     F64,
     I32,
@@ -561,24 +561,26 @@ MIN_ROOM_M2 = 1.2
 WIDE_SHARE = 1.1
 """An opening that is wider than this share of the narrower space beside it separates no rooms: what
 is behind it is the same corridor or hall, past a column, a niche or a cupboard."""
-ACROSS_SHARE = 0.85
-"""A passage that is wider than this share of the wider space beside it lies across a corridor,
-between the doors on either side. So does one that is wider than this share of the narrower space,
-if that is as long as a corridor and both lead on: a corridor that gets wider stays one."""
 
 
 def segment_rooms(
     chambers: Chambers,
+    segments: Sequence[Segment],
     is_opening: Sequence[bool],
     widths_m: Sequence[float],
     cell: float,
 ) -> I64:
     """Join chambers into rooms.
 
+    A passage that is wider than `ACROSS_SHARE` of the wider space beside it lies across a corridor,
+    between the doors on either side. So does one that is wider than this share of the narrower
+    space, if that is as long as a corridor and both lead on: a corridor that gets wider stays one.
+
     Args:
         chambers: The free space, cut at doorways and openings.
-        is_opening: Whether each line at which the chambers were cut is an opening, not a doorway.
-        widths_m: The length of each such line [m].
+        segments: The lines at which the chambers were cut [lattice].
+        is_opening: Whether each line is an opening, not a doorway.
+        widths_m: The length of each line [m].
         cell: Side of a cell [m].
 
     Returns:
@@ -588,19 +590,23 @@ def segment_rooms(
     areas = sizes * cell**2
     of_cell = without_furniture(chambers.of_cell, cell)
     across = _clear_widths(of_cell, chambers.count, cell)
+    is_across = [
+        _is_across(of_cell, link.chambers, segments[link.line], widths_m[link.line] / cell)
+        for link in chambers.links
+    ]
     owner = np.arange(chambers.count)
     while True:
         candidates = []
         pairs = {frozenset(owner[[*link.chambers]].tolist()) for link in chambers.links}
         borders = [pair for pair in pairs if len(pair) == 2]
-        for link in chambers.links:
+        for link, goes_on in zip(chambers.links, is_across, strict=True):
             one, other = (int(owner[chamber]) for chamber in link.chambers)
             opening = is_opening[link.line]
             width = widths_m[link.line]
             narrower, wider = sorted((one, other), key=across.__getitem__)
             narrow = across[narrower]
             is_wide = opening and width > WIDE_SHARE * narrow
-            is_wide |= width > ACROSS_SHARE * across[wider]
+            is_wide |= goes_on or width > ACROSS_SHARE * across[wider]
             if areas[narrower] >= LONG * narrow**2 and width > ACROSS_SHARE * narrow:
                 is_wide |= _leads_on(one, borders) and _leads_on(other, borders)
             for room, into in ((one, other), (other, one)):
@@ -614,6 +620,32 @@ def segment_rooms(
         across[into] = max(across[into], across[smallest])
         owner[owner == smallest] = into
     return by_size(np.append(owner, -1)[chambers.of_cell])
+
+
+def _is_across(of_cell: I32, pair: tuple[int, int], segment: Segment, width: float) -> bool:
+    """Return whether a line lies across a corridor: beside it, space is as wide on both sides.
+
+    Args:
+        of_cell: The chamber of each cell.
+        pair: The chambers on its sides.
+        segment: The line [lattice].
+        width: Its length [cells].
+    """
+    column, row = (np.mean(segment, axis=0) / UNITS_PER_CELL).tolist()
+    left, low = (max(math.floor(at - 3 * width), 0) for at in (column, row))
+    window = of_cell[low : math.ceil(row + 3 * width), left : math.ceil(column + 3 * width)]
+    rows, columns = np.indices(window.shape)
+    near = np.hypot(columns + left + 0.5 - column, rows + low + 0.5 - row) <= width
+
+    def clear(inside: Bool) -> float:
+        """Return the diameter of the largest disc in some cells with its centre near the line."""
+        squares = squared_distance(np.pad(inside, 1))[1:-1, 1:-1]
+        # From the centre of a cell to that of one in a wall is half a cell farther than to the wall.
+        return 2 * math.sqrt(int(squares[near].max())) - 1
+
+    return ACROSS_SHARE * clear(np.isin(window, pair)) < width and all(
+        ACROSS_SHARE * width < clear(window == chamber) for chamber in pair
+    )
 
 
 def _leads_on(room: int, borders: Sequence[frozenset[int]]) -> bool:
