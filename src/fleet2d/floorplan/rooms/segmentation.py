@@ -640,7 +640,7 @@ def _is_across(of_cell: I32, pair: tuple[int, int], segment: Segment, width: flo
     def clear(inside: Bool) -> float:
         """Return the diameter of the largest disc in some cells with its centre near the line."""
         squares = squared_distance(np.pad(inside, 1))[1:-1, 1:-1]
-        # From the centre of a cell to that of one in a wall is half a cell farther than to the wall.
+        # The centre of a cell in a wall is half a cell farther away than the wall.
         return 2 * math.sqrt(int(squares[near].max())) - 1
 
     return ACROSS_SHARE * clear(np.isin(window, pair)) < width and all(
