@@ -45,7 +45,7 @@ Corners = NDArray[np.intp]
 MIN_DOOR_M = 0.5
 MAX_DOOR_M = 1.4
 """Widths of doorways, from what a person fits through to a double door."""
-MAX_OPENING_M = 2.8
+MAX_OPENING_M = 3.6
 """The widest opening that still separates rooms, such as a kitchen and its dining area."""
 MAX_LEAN = 0.2
 """Largest sine of the angle between a passage and the shortest line, since traced walls lean."""
@@ -640,8 +640,7 @@ def _is_across(of_cell: I32, pair: tuple[int, int], segment: Segment, width: flo
     def clear(inside: Bool) -> float:
         """Return the diameter of the largest disc in some cells with its centre near the line."""
         squares = squared_distance(np.pad(inside, 1))[1:-1, 1:-1]
-        # The centre of a cell in a wall is half a cell farther away than the wall.
-        return 2 * math.sqrt(int(squares[near].max())) - 1
+        return 2 * math.sqrt(int(squares[near].max()))
 
     return ACROSS_SHARE * clear(np.isin(window, pair)) < width and all(
         ACROSS_SHARE * width < clear(window == chamber) for chamber in pair
