@@ -45,7 +45,7 @@ Corners = NDArray[np.intp]
 MIN_DOOR_M = 0.5
 MAX_DOOR_M = 1.4
 """Widths of doorways, from what a person fits through to a double door."""
-MAX_OPENING_M = 3.6
+MAX_OPENING_M = 2.8
 """The widest opening that still separates rooms, such as a kitchen and its dining area."""
 MAX_LEAN = 0.2
 """Largest sine of the angle between a passage and the shortest line, since traced walls lean."""
