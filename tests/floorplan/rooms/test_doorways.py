@@ -89,6 +89,14 @@ def test_corner_beside_a_wall_keeps_a_polygon_valid_where_no_other_wall_is_near(
         assert (shapely.get_coordinates(changed) == point).all(axis=1).any()
 
 
+@pytest.mark.parametrize(("tip", "is_alone"), [(1.0, False), (3.0, True)])
+def test_corner_is_alone_unless_its_wall_moves_over_another(tip, is_alone):
+    wedge = [(50, tip), (52, 90), (48, 90)]
+    polygon = shapely.Polygon([(0, 0), (100, 0), (100, 100), (0, 100)], [wedge])
+    changed, was_alone = _with_corner(polygon, np.array([10.0, 4.0]))
+    assert is_alone == was_alone == changed.is_valid
+
+
 def test_unknown_doorway_is_refused_with_the_known_ones():
     with pytest.raises(FloorPlanError, match=r"no doorway 'kitchen'.*kitchen_1-bathroom_1"):
         flat(DoorLine((2.05, 1.0), (2.05, 1.9))).doorway("kitchen")
