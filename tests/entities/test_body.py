@@ -1,20 +1,17 @@
 """Bodies keep their distance from walls, their speed and their turn rate, whatever they do."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 import shapely
 from tests.scenes import OWN, everything, path, run, scenario
 
 import fleet2d
-from fleet2d.runs.run import Run
 
 # What rounding to the lattice (0.8 mm) and to a step may add.
 LATTICE_M = 2e-3
 
 
-def free_space(stored: Run) -> shapely.MultiPolygon:
+def free_space(stored):
     """The space between the walls [m], as shapely has it."""
     lattice = stored.plan.lattice
     return shapely.union_all(
@@ -22,7 +19,7 @@ def free_space(stored: Run) -> shapely.MultiPolygon:
     )
 
 
-def check_body(stored: Run, name: str, radius: float, speed: float, turn_rate_deg: float) -> None:
+def check_body(stored, name, radius, speed, turn_rate_deg):
     """Check every pose of a body, and the way between every two."""
     poses = path(stored, name)
     step_s = stored.manifest["step_us"] / 1e6
@@ -51,6 +48,14 @@ BODIES = {
 
 
 @pytest.fixture(scope="module")
+def fine():
+    """Twenty minutes in steps of a tenth of a second: who goes round a corner hugs it."""
+    content = everything("20 min")
+    content["simulation"]["step"] = "100 ms"
+    return run(content)
+
+
+@pytest.fixture(scope="module")
 def whole():
     """Two hours with every behavior."""
     return run(everything())
@@ -62,15 +67,11 @@ def test_a_body_keeps_its_radius_speed_and_turn_rate(whole, name):
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_no_move_crosses_a_wall_between_two_steps(whole, name):
-    # At a tenth of a second, a body that goes round a corner between two steps hugs it.
-    content = everything("20 min")
-    content["simulation"]["step"] = "100 ms"
-    stored = run(content)
-    poses = path(stored, name)
+def test_no_move_crosses_a_wall_between_two_steps(fine, name):
+    poses = path(fine, name)
     xy = np.stack([poses.x, poses.y], axis=-1)
     lines = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1))
-    assert shapely.distance(free_space(stored).boundary, lines).min() > BODIES[name][0] - 0.02
+    assert shapely.distance(free_space(fine).boundary, lines).min() > BODIES[name][0] - 0.02
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.3, 0.44])
@@ -83,7 +84,7 @@ def test_wide_and_narrow_bodies_keep_their_radius(radius):
 
 def test_who_stands_where_a_walk_was_broken_off_can_go_on():
     """Interrupted at any step, also at a corner of the space: there is always a way."""
-    scripts: Any = [f"{room}" for room in ("kitchen", "bedroom", "bathroom", "living_room") * 20]
+    scripts = [f"{room}" for room in ("kitchen", "bedroom", "bathroom", "living_room") * 20]
     behaviors = [{"type": f"{OWN}:Scripted", "script": scripts}]
     stored = run(scenario("1 h", users={"ana": {"behaviors": behaviors}}))
     check_body(stored, "ana", 0.2, 1.0, 180)

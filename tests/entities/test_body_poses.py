@@ -1,21 +1,18 @@
 """Bodies of a run: where each is at which step, and when it decides."""
 
 import pickle
-from typing import Any
 
 import numpy as np
 import pytest
 
 from fleet2d.engine import state
-from fleet2d.entities.body import NEVER, Bodies, Pose, Track, poses_of
+from fleet2d.entities.body import NEVER, Bodies, Pose, Track
 from fleet2d.kernels import Breakpoints
 
 SECOND = 1_000_000
 
 
-def planned(
-    *ways: tuple[float, int], posture: int = 0, postures: tuple[tuple[float, int], ...] = ()
-) -> Any:
+def planned(*ways, posture=0, postures=()):
     """Return a motion by breakpoints (time [s], x), and postures from times [s] on."""
     times = np.array([round(seconds * SECOND) for seconds, _ in ways], np.int64)
     x = np.array([x for _, x in ways], np.int64)
@@ -26,7 +23,7 @@ def planned(
     return track, Pose(ways[0][1], 0, 0, 0), (changes, codes)
 
 
-def bodies_at(*xs: int) -> Bodies:
+def bodies_at(*xs):
     """Return bodies that rest at x = …, one user and the rest robots."""
     bodies = Bodies(1, len(xs) - 1, SECOND)
     for row, x in enumerate(xs):
@@ -43,21 +40,6 @@ def test_watchers_take_in_fewer_steps_the_more_bodies_there_are_but_never_few(ac
     assert state.MIN_STEPS <= capacity <= state.MAX_STEPS
 
 
-def test_a_row_of_a_block_is_the_poses_of_a_body_at_each_step():
-    bodies = bodies_at(5, 7, 9)
-    bodies.follow(1, *planned((0, 7), (4, 11)))
-    block = bodies.block(1, 6)
-    assert [5] * 5 == block.x[0].tolist()
-    assert [8, 9, 10, 11, 11] == block.x[1].tolist() == poses_of(block, 1).x.tolist()
-    assert (3, 5) == block.x.shape == block.posture.shape
-    assert [Pose(x, 0, 0, 0) for x in (8, 9, 10)] == [bodies.pose_at(1, step) for step in (1, 2, 3)]
-    assert [[5, 0, 0, 0], [10, 0, 0, 0], [9, 0, 0, 0]] == bodies.poses(np.array([2, 3]))[1].tolist()
-
-
-def test_a_block_of_nobody_has_no_rows():
-    assert (0, 4) == Bodies(0, 0, SECOND).block(0, 4).x.shape
-
-
 def test_a_plan_holds_from_the_present_step_on():
     bodies = bodies_at(5, 7)
     bodies.step = 3
@@ -67,16 +49,6 @@ def test_a_plan_holds_from_the_present_step_on():
     bodies.hold(1, Pose(1, 2, 3, 1))
     assert [7, 7, 7, 1, 1, 1] == bodies.block(0, 6).x[1].tolist()
     assert Pose(1, 2, 3, 1) == bodies.pose_at(1, bodies.step)
-
-
-def test_postures_are_taken_and_forgotten_when_a_plan_has_none():
-    bodies = bodies_at(5)
-    bodies.step = 10
-    bodies.follow(0, *planned((10, 5), posture=0, postures=((12, 2),)))
-    assert [0, 0, 2, 2] == bodies.block(10, 14).posture[0].tolist()
-    bodies.step = 14
-    bodies.follow(0, *planned((14, 5)))
-    assert [2, 0, 0, 0] == bodies.block(13, 17).posture[0].tolist()
 
 
 def test_who_is_due_is_whose_step_has_come():
@@ -101,13 +73,3 @@ def test_bodies_are_written_without_what_follows_and_read_the_same():
     assert (bodies.step, bodies.users, bodies.ask_at.tolist()) == (
         again.step, again.users, again.ask_at.tolist()
     )  # fmt: skip
-
-
-def test_what_is_forgotten_is_no_longer_told():
-    bodies = bodies_at(5, 7)
-    bodies.step = 4
-    bodies.follow(1, *planned((4, 20)))
-    bodies.forget(4)
-    assert [20] == bodies.block(4, 5).x[1].tolist()
-    with pytest.raises(ValueError, match="forgotten"):
-        bodies.pose_at(1, 3)

@@ -1,7 +1,6 @@
 """What the tests of drives share."""
 
 import copy
-from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,12 +12,11 @@ from tests.scenes import digests, path, run, table
 from tests.thorough import some
 
 import fleet2d
-from fleet2d import Behavior, Drive, Moment, Plan, Route, Situation
+from fleet2d import Drive, Moment
 from fleet2d.configuration.components import components
 from fleet2d.entities.drive import Differential, breakpoints, estimate
-from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.entities.robots.drives import Holonomic, Trapezoidal
-from fleet2d.errors import ComponentError, ScenarioError
+from fleet2d.errors import ComponentError
 from fleet2d.kernels import TURN, time_route
 from fleet2d.scenario.compose import compose
 
@@ -26,13 +24,11 @@ CORNER = [(0, 0), (3, 0), (3, 2)]
 """A route that turns left after three metres [m]."""
 
 
-def driven(
-    drive: Drive, points: list[tuple[float, float]] = CORNER, heading_deg: float = 0.0
-) -> list[tuple[float, ...]]:
+def driven(drive, points=CORNER, heading_deg=0.0):
     """The breakpoints of a robot of 0.5 m/s and 90 degrees/s: s, x and y [m], heading [degrees]."""
     route = np.round(np.array(points) * 1000).astype(np.int64)  # a unit is a millimetre
     heading = round(heading_deg / 360 * TURN)
-    rows: Any = breakpoints(drive, route, heading, (500.0, TURN / 4), 1000.0)
+    rows = breakpoints(drive, route, heading, (500.0, TURN / 4), 1000.0)
     assert not rows[:, 4].any()
     numbers = rows[:, :4] / [1e6, 1000, 1000, TURN / 360]
     return [tuple(row) for row in np.round(numbers, 3).tolist()]
@@ -48,7 +44,7 @@ class Returned(Drive):
 
     moments_of_test: ClassVar[Any] = ()
 
-    def moments(self, route: Route) -> Iterable[Moment]:
+    def moments(self, route):
         if isinstance(self.moments_of_test, Exception):
             raise self.moments_of_test
         return [Moment(*moment) for moment in self.moments_of_test]
@@ -57,19 +53,12 @@ class Returned(Drive):
 class Flight(Drive):
     """Drives at ten times its speed, and mentions only the end."""
 
-    def moments(self, route: Route) -> list[Moment]:
+    def moments(self, route):
         metres = sum(leg.length for leg in route.legs)
         return [Moment(metres / route.speed / 10, metres, route.legs[-1].direction)]
 
 
-class Sit(Behavior):
-    """Sits down on the chair."""
-
-    def decide(self, now: Situation) -> Plan | None:
-        return now.plan().use("chair_1").stay()
-
-
-def busy(drive: Any) -> dict[str, Any]:
+def busy(drive):
     """Robots that do all that robots do, and are in each other's and in people's way."""
     behaviors = [
         {"type": "dock", "until": "40 %"},
@@ -119,40 +108,9 @@ def test_a_run_is_the_same_for_every_span_and_continues_from_a_copy_and_from_a_f
     assert digests(whole) == digests(fleet2d.Simulation.load(tmp_path / "half.sim").run())
 
 
-@pytest.mark.parametrize("drive", OTHERS)
-def test_a_robot_stays_on_its_routes(drive):
-    """It is where the usual drive would be, only at another time."""
-    content = home_with([{"type": "patrol", "dwell": "10 s"}], "10 min")
-    usual, other = (
-        path(run(content, f"robots.astro.drive={kind}"), "astro")
-        for kind in ("differential", drive)
-    )
-    places = np.stack([usual.x, usual.y], axis=1)
-    for x, y in zip(other.x[:400].tolist(), other.y[:400].tolist(), strict=True):
-        assert np.hypot(*(places - (x, y)).T).min() < 0.31  # the way of half a second
-
-
 def test_a_drive_of_ones_own_passes_corners_that_it_does_not_mention():
     assert [(0.6, 3.0, 0.0), (1.0, 3.0, 2.0)] == [row[:3] for row in driven(Flight())]
     assert [54.0, 90.0] == pytest.approx([row[3] for row in driven(Flight())], abs=0.1)
-
-
-def test_a_drive_of_ones_own_in_a_file_beside_the_scenario(tmp_path):
-    (tmp_path / "mine.py").write_text(
-        "from fleet2d import Drive, Moment, Route\n"
-        "class Slow(Drive):\n"
-        "    '''Drives slowly.'''\n"
-        "    factor: float = 0.5\n"
-        "    def moments(self, route: Route) -> list[Moment]:\n"
-        "        metres = sum(leg.length for leg in route.legs)\n"
-        "        return [Moment(metres / route.speed / self.factor, metres, route.heading)]\n"
-    )
-    content = home_with([GO], "1 min", astro={"drive": {"type": f"{tmp_path}/mine:Slow"}})
-    ways = [
-        path(run(content, f"robots.astro.drive.factor={factor}"), "astro").x for factor in (1, 0.25)
-    ]
-
-    assert [6, 21] == [int(np.argmax(way > 3.99)) + 1 for way in ways]
 
 
 @pytest.mark.parametrize(
@@ -181,7 +139,7 @@ class Hopes(Returned):
 
     estimate: float | list[float]
 
-    def seconds(self, metres: Any, speed: float) -> Any:
+    def seconds(self, metres, speed):
         return np.array(self.estimate)
 
 
@@ -207,26 +165,10 @@ def test_errors_name_robot_drive_and_step(moments, words, monkeypatch):
     assert words in str(caught.value)
 
 
-def test_robots_think_that_a_way_takes_what_their_drive_takes():
-    times = {}
-    for drive in ("differential", "holonomic", "trapezoidal"):
-        simulation = fleet2d.Simulation(home_with([], "1 min", astro={"drive": drive}))
-        actor = simulation._state.actors[-1]
-        times[drive] = way_seconds(actor, actor.point((1, 3)), actor.point((1, 1)))
-        assert way_seconds(actor, actor.point((1, 3)), actor.point((1, 3))) == 0
-        assert [0, times[drive]] == pytest.approx(
-            actor.seconds(np.array([0.0, 2.0])).tolist(), abs=1e-3
-        )
-    assert times == pytest.approx(
-        {"differential": 2 / 0.6, "holonomic": 2 / 0.6, "trapezoidal": 2 / 0.6 + 0.6 / 0.5},
-        abs=1e-3,
-    )
-
-
 def test_another_type_in_an_override_replaces_the_keys_of_the_old_one():
     base = {"robots": {"astro": {"drive": {"type": "trapezoidal", "acceleration": 0.2}}}}
 
-    def drive(*overrides: str) -> Any:
+    def drive(*overrides):
         return compose(base, overrides).data["robots"]["astro"]["drive"]
 
     assert {"type": "holonomic"} == drive("robots.astro.drive=holonomic")
@@ -234,27 +176,33 @@ def test_another_type_in_an_override_replaces_the_keys_of_the_old_one():
     assert {"type": "trapezoidal", "acceleration": 1} == drive("robots.astro.drive.acceleration=1")
 
 
-def test_an_unknown_drive_is_refused_with_the_names_of_all():
-    with pytest.raises(ScenarioError) as caught:
-        fleet2d.load_scenario("bundled:paper", "robots.astro.drive=holonomc")
-    assert "did you mean 'holonomic'" in str(caught.value)
-
-
-def test_people_have_no_drive():
-    with pytest.raises(ScenarioError) as caught:
-        fleet2d.load_scenario("bundled:paper", "users.ana.drive=holonomic")
-    assert "drive" in str(caught.value)
-
-
 POINTS = st.lists(st.tuples(*[st.integers(-5000, 5000)] * 2), min_size=1, max_size=6)
 
 
-def test_it_turns_on_the_spot_and_then_drives():
-    assert [
-        (6.0, 3.0, 0.0, 0.0),
-        (7.0, 3.0, 0.0, 90.0),
-        (11.0, 3.0, 2.0, 90.0),
-    ] == driven(Differential())
+@pytest.mark.parametrize(
+    ("drive", "points", "heading_deg", "expected"),
+    [
+        # A quarter turn takes a second, half a metre.
+        (Holonomic(), CORNER, 0, [(6, 3, 0, 0), (7, 3, 0.5, 90), (10, 3, 2, 90)]),
+        (Holonomic(), [(0, 0), (0.25, 0)], 270, [(0.5, 0.25, 0, 315)]),
+        (Holonomic(), [(0, 0), (0, 0.25), (0, 0.5)], 0, [(0.5, 0, 0.25, 45), (1, 0, 0.5, 90)]),
+        (Holonomic(turns=False), CORNER, 45, [(6, 3, 0, 45), (10, 3, 2, 45)]),
+        (
+            Trapezoidal(acceleration=0.25, pieces=2),
+            CORNER,
+            0,
+            [
+                (1, 0.125, 0, 0), (2, 0.5, 0, 0),  # 0.5 m/s after two seconds and half a metre
+                (6, 2.5, 0, 0), (7, 2.875, 0, 0), (8, 3, 0, 0), (9, 3, 0, 90),
+                (10, 3, 0.125, 90), (11, 3, 0.5, 90), (13, 3, 1.5, 90), (14, 3, 1.875, 90),
+                (15, 3, 2, 90),  # 2 m / 0.5 m/s + 2 s
+            ],
+        ),
+    ],
+    ids=["turns while it drives", "as far as the way lasts", "the shorter way", "never turns", "speeds up on each leg"],
+)  # fmt: skip
+def test_a_robot_drives_as_its_drive_has_it(drive, points, heading_deg, expected):
+    assert expected == driven(drive, points, heading_deg)
 
 
 @given(POINTS, st.integers(0, TURN - 1), st.floats(1, 5000), st.floats(1, TURN))
@@ -268,59 +216,10 @@ def test_it_is_the_same_as_in_the_core(points, heading, speed, turn_rate):
     assert ((late >= -1) & (late <= 1 + np.arange(len(late)))).all()
 
 
-def test_it_turns_while_it_drives():
-    assert [
-        (6.0, 3.0, 0.0, 0.0),
-        (7.0, 3.0, 0.5, 90.0),  # a quarter turn takes a second, half a metre
-        (10.0, 3.0, 2.0, 90.0),
-    ] == driven(Holonomic())
-
-
-def test_it_turns_the_shorter_way_as_far_as_the_way_lasts():
-    assert [(0.5, 0.25, 0.0, 315.0)] == driven(Holonomic(), [(0, 0), (0.25, 0)], heading_deg=270)
-    assert [(0.5, 0.0, 0.25, 45.0), (1.0, 0.0, 0.5, 90.0)] == driven(
-        Holonomic(), [(0, 0), (0, 0.25), (0, 0.5)]
-    )
-
-
-def test_it_keeps_its_heading_if_it_never_turns():
-    assert [(6.0, 3.0, 0.0, 45.0), (10.0, 3.0, 2.0, 45.0)] == driven(
-        Holonomic(turns=False), heading_deg=45
-    )
-
-
-def along(acceleration: float, metres: float, pieces: int = 64) -> np.ndarray:
-    """Time [s] and position [m] on a straight way."""
-    drive = Trapezoidal(acceleration=acceleration, pieces=pieces)
-    return np.array([(0, 0), *((s, x) for s, x, _, _ in driven(drive, [(0, 0), (metres, 0)]))])
-
-
-def test_it_takes_speed_by_acceleration_longer_for_each_leg():
-    rows = driven(Trapezoidal(acceleration=0.25, pieces=2))
-
-    assert (
-        [
-            (1.0, 0.125, 0.0, 0.0),  # 0.5 m/s after two seconds and half a metre
-            (2.0, 0.5, 0.0, 0.0),
-            (6.0, 2.5, 0.0, 0.0),
-            (7.0, 2.875, 0.0, 0.0),
-            (8.0, 3.0, 0.0, 0.0),
-            (9.0, 3.0, 0.0, 90.0),
-        ]
-        == rows[:6]
-    )
-    assert (15.0, 3.0, 2.0, 90.0) == rows[-1]  # 2 m / 0.5 m/s + 2 s
-
-
-def test_on_a_short_leg_it_brakes_before_it_is_at_full_speed():
-    rows = along(0.25, 0.36, pieces=2)
-
-    assert [[0, 0], [0.6, 0.045], [1.2, 0.18], [1.8, 0.315], [2.4, 0.36]] == rows.tolist()
-
-
-@pytest.mark.parametrize("metres", [0.01, 0.05, 1.0, 7.5])
+@pytest.mark.parametrize("metres", [0.01, 0.36, 1.0, 7.5])
 def test_positions_and_speeds_are_those_of_the_profile(metres):
-    time, x = along(0.5, metres, pieces=8).T
+    rows = driven(Trapezoidal(acceleration=0.5, pieces=8), [(0, 0), (metres, 0)])
+    time, x = np.array([(0, 0), *(row[:2] for row in rows)]).T
 
     ramp, left = min(0.5, metres) / 2, time[-1] - time
     rising = np.sqrt(2 * ramp / 0.5)
@@ -330,7 +229,6 @@ def test_positions_and_speeds_are_those_of_the_profile(metres):
     )
     assert exact == pytest.approx(x, abs=0.002)
     assert (np.diff(x) > 0).all()
-    assert (np.diff(x) <= 0.5 * np.diff(time) + 0.002).all()
 
 
 def test_it_thinks_that_ways_take_what_they_take():

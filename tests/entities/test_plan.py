@@ -1,20 +1,18 @@
 """Plans and who makes them: legs, interruptions, arbitration, and what a behavior may not do."""
 
-from collections.abc import Callable
 from datetime import datetime, timedelta
-from typing import Any
 
 import numpy as np
 import pytest
 from tests.scenes import path, scenario, table
 
 import fleet2d
-from fleet2d import Behavior, Plan, Situation
+from fleet2d import Behavior
 from fleet2d.errors import ComponentError, InputError
-from fleet2d.runs.run import Run
 
-Decide = Callable[[Situation], Plan | None]
-_DECIDE: dict[str, Decide] = {}
+SECOND = timedelta(seconds=1)
+HOUR = timedelta(hours=1)
+_DECIDE = {}
 
 
 class Told(Behavior):
@@ -23,11 +21,11 @@ class Told(Behavior):
     records = frozenset({"back", "gone", "later", "never", "now", "on the step"})
     name: str
 
-    def decide(self, now: Situation) -> Plan | None:
+    def decide(self, now):
         return _DECIDE[self.name](now)
 
 
-def entity_with(*functions: Decide, **body: Any) -> dict[str, Any]:
+def entity_with(*functions, **body):
     """The configuration of a body that asks these functions in turn."""
     behaviors = []
     for number, function in enumerate(functions):
@@ -37,7 +35,7 @@ def entity_with(*functions: Decide, **body: Any) -> dict[str, Any]:
     return {"start": [1.0, 3.0], "start_heading_deg": 0, "behaviors": behaviors, **body}
 
 
-def run(*functions: Decide, duration: str = "5 min", **body: Any) -> Run:
+def run(*functions, duration="5 min", **body):
     return fleet2d.run(
         scenario(
             duration,
@@ -47,90 +45,42 @@ def run(*functions: Decide, duration: str = "5 min", **body: Any) -> Run:
     )
 
 
-def recording_steps(function: Decide) -> tuple[list[int], Decide]:
+def recording_steps(function):
     """A list that fills with the steps at which the function is asked."""
-    steps: list[int] = []
+    steps = []
 
-    def decide(now: Situation) -> Plan | None:
+    def decide(now):
         steps.append(now.step)
         return function(now)
 
     return steps, decide
 
 
-def minute(now: Situation) -> Plan:
+def minute(now):
     return now.plan().stay(timedelta(minutes=1))
 
 
 # --- Legs --------------------------------------------------------------------------------------
 
 
-def test_a_turn_takes_the_long_way_if_told_to():
-    poses = path(run(lambda now: now.plan().turn_by(-1.5).stay(), turn_rate_deg=18), "ana")
-    turned = np.unwrap(poses.heading)
-    assert turned[:31] == pytest.approx(np.linspace(0, -3 * np.pi, 31), abs=0.01)
-    assert turned[32:] == pytest.approx(-3 * np.pi, abs=0.01)
+WHEN = datetime(2026, 1, 5, 7, 1, 40)
 
 
-def test_staying_until_a_past_time_takes_no_time():
-    steps, decide = recording_steps(
-        lambda now: now.plan().stay(until=now.time - timedelta(hours=1)).stay(timedelta(seconds=30))
-    )
+@pytest.mark.parametrize(
+    ("decide", "expected"),
+    [
+        (lambda now: now.plan().stay(until=now.time - HOUR).stay(30 * SECOND), range(0, 300, 30)),
+        (lambda now: now.plan().stay(until=WHEN if now.time < WHEN else None), [0, 100]),
+        (lambda now: now.plan().stay(10.4 * SECOND), [*range(0, 300, 11)]),
+        (lambda now: now.plan(), range(300)),
+        (lambda now: None, [0, 60, 120, 180, 240]),
+    ],
+    ids=["past time", "time", "end between two steps", "no time", "no plan"],
+)
+def test_who_decides_is_asked_again_when_its_plan_is_over(decide, expected):
+    steps, decide = recording_steps(decide)
     run(decide)
-    assert list(range(0, 300, 30)) == steps
-
-
-def test_staying_until_a_time_ends_at_it():
-    when = datetime(2026, 1, 5, 7, 1, 40)
-    steps, decide = recording_steps(
-        lambda now: now.plan().stay(until=when) if now.time < when else now.plan().stay()
-    )
-    run(decide)
-    assert [0, 100] == steps
-
-
-def test_a_plan_that_ends_between_two_steps_is_followed_up_at_the_next():
-    steps, decide = recording_steps(lambda now: now.plan().stay(timedelta(seconds=10.4)))
-    run(decide, duration="1 min")
-    assert [0, 11, 22, 33, 44, 55] == steps
-
-
-def test_a_plan_that_takes_no_time_is_asked_for_once_a_step():
-    steps, decide = recording_steps(lambda now: now.plan())
-    run(decide, duration="1 min")
-    assert list(range(60)) == steps
-
-
-def test_a_plan_knows_the_time_up_to_which_it_is_made():
-    times = []
-
-    def decide(now: Situation) -> Plan:
-        plan = now.plan().stay(timedelta(seconds=90))
-        times.append((now.time, plan.time))
-        return plan
-
-    run(decide, duration="3 min")
-    start = datetime(2026, 1, 5, 7)
-    assert [
-        (start, start + timedelta(seconds=90)),
-        (start + timedelta(seconds=90), start + timedelta(minutes=3)),
-    ] == times
-
-
-def test_leaving_and_coming_home():
-    def decide(now: Situation) -> Plan:
-        plan = now.plan().leave_home().note("gone").stay(timedelta(seconds=60)).come_home()
-        return plan.note("back").stay()
-
-    stored = run(decide)
-    events = table(stored, "events")
-    assert ["left_home", "gone", "came_home", "back"] == events["event"].tolist()
-    gone, back = events["step"][0], events["step"][2]
-    away = path(stored, "ana").away
-    assert 60 <= back - gone <= 61
-    assert away[gone:back].all()
-    assert not away[:gone].any()
-    assert not away[back:].any()
+    assert [*expected] == steps
 
 
 def test_leaving_twice_and_coming_home_at_home_do_nothing():
@@ -138,16 +88,20 @@ def test_leaving_twice_and_coming_home_at_home_do_nothing():
     assert ["left_home"] == table(stored, "events")["event"].tolist()
 
 
-@pytest.mark.parametrize("leg", ["go_to", "go_to_point"])
-def test_who_is_away_comes_home_before_walking(leg):
-    def decide(now: Situation) -> Plan:
+@pytest.mark.parametrize(
+    "go",
+    [
+        lambda plan, actor: plan.go_to("kitchen"),
+        lambda plan, actor: plan.go_to_point(*actor.find("kitchen", 0, "spot")),
+    ],
+    ids=["place", "point"],
+)
+def test_who_is_away_comes_home_before_walking(go):
+    def decide(now):
         if not now.actor.state.away:
-            return now.plan().leave_home().stay(timedelta(seconds=30))
+            return now.plan().leave_home().stay(30 * SECOND)
         assert now.room is None
-        plan = now.plan()
-        if leg == "go_to":
-            return plan.go_to("kitchen").stay()
-        return plan.go_to_point(*now.actor.find("kitchen", 0, "spot")).stay()
+        return go(now.plan(), now.actor).stay()
 
     stored = run(decide)
     assert ["left_home", "came_home"] == table(stored, "events")["event"].tolist()
@@ -157,14 +111,9 @@ def test_who_is_away_comes_home_before_walking(leg):
 
 
 def test_notes_are_told_at_the_first_step_not_before_them():
-    def decide(now: Situation) -> Plan:
-        plan = now.plan().note("now").stay(timedelta(seconds=2.5)).note("later", "why")
-        return (
-            plan.stay(timedelta(seconds=1.5))
-            .note("on the step")
-            .stay(timedelta(days=1))
-            .note("never")
-        )
+    def decide(now):
+        plan = now.plan().note("now").stay(2.5 * SECOND).note("later", "why")
+        return plan.stay(1.5 * SECOND).note("on the step").stay(24 * HOUR).note("never")
 
     events = table(run(decide), "events")
     assert ["now", "later", "on the step"] == events["event"].tolist()
@@ -185,71 +134,35 @@ def test_the_first_behavior_with_a_plan_is_followed():
     assert [0, 60] == third
 
 
-def test_if_nobody_has_a_plan_it_stays_still_and_asks_again():
-    steps, decide = recording_steps(lambda now: None)
-    stored = run(decide)
-    assert [0, 60, 120, 180, 240] == steps
-    poses = path(stored, "ana")
-    assert 1 == len(set(zip(poses.x, poses.y, poses.heading, strict=True)))
-
-
-def test_without_behaviors_it_stays_still_for_good():
-    poses = path(run(), "ana")
-    assert (1.0, 3.0) == (poses.x[0], poses.y[0])
-    assert 1 == len(set(zip(poses.x, poses.y, poses.heading, strict=True)))
+@pytest.mark.parametrize("decide", [(), (lambda now: None,)], ids=["no behavior", "no plan"])
+def test_without_a_plan_it_stays_still(decide):
+    poses = path(run(*decide), "ana")
+    assert {(1.0, 3.0, 0.0)} == set(zip(poses.x, poses.y, poses.heading, strict=True))
 
 
 def test_a_situation_tells_where_and_when_it_is():
-    situations: list[Any] = []
+    situations = []
 
-    def decide(now: Situation) -> Plan:
-        situations.append(
-            (now.step, now.time, now.xy, now.room.name if now.room else None, now.events)
-        )
+    def decide(now):
+        room = now.room.name if now.room else None
+        situations.append((now.time - now.step * SECOND, now.xy, room, now.events))
         return now.plan().go_to([7.0, 1.0]).stay(timedelta(minutes=2))
 
     run(decide, duration="3 min")
-    assert (0, datetime(2026, 1, 5, 7), (1.0, 3.0), "living_room_1", ()) == situations[0]
-    assert (7.0, 1.0) == situations[1][2]
-    assert "kitchen_1" == situations[1][3]
-    assert datetime(2026, 1, 5, 7) + timedelta(seconds=situations[1][0]) == situations[1][1]
-
-
-def test_draws_depend_on_body_purpose_and_step_only():
-    drawn: dict[Any, float] = {}
-
-    def decide(now: Situation) -> Plan:
-        for purpose in ("this", "that"):
-            again = {now.random(purpose).uniform() for _ in range(2)}
-            assert 1 == len(again)
-            drawn[now.actor.name, purpose, now.step] = again.pop()
-        return minute(now)
-
-    fleet2d.run(scenario("3 min", users={"ana": entity_with(decide), "ben": entity_with(decide)}))
-    assert 12 == len(drawn) == len(set(drawn.values()))
-    before = dict(drawn)
-    drawn.clear()
-    fleet2d.run(
-        scenario(
-            "3 min",
-            users={
-                "cleo": entity_with(minute),
-                "ana": entity_with(minute, decide),
-                "ben": entity_with(decide),
-            },
-        )
-    )
-    assert 6 == len(drawn)
-    assert before.items() >= drawn.items()
+    start = datetime(2026, 1, 5, 7)
+    assert [
+        (start, (1.0, 3.0), "living_room_1", ()),
+        (start, (7.0, 1.0), "kitchen_1", ()),
+    ] == situations
 
 
 # --- Interruptions -----------------------------------------------------------------------------
 
 
-def watched(decide: Decide, *others: Decide, **camera: Any) -> dict[str, Any]:
+def watched(decide, *others, **camera):
     """A user who leaves the living room after 100 s and comes back at 200 s, and a robot in it."""
 
-    def leave(now: Situation) -> Plan:
+    def leave(now):
         plan = now.plan().stay(timedelta(seconds=100)).go_to([7.0, 6.0])
         return plan.stay(until=datetime(2026, 1, 5, 7, 3, 20)).go_to([1.0, 3.0]).stay()
 
@@ -259,71 +172,29 @@ def watched(decide: Decide, *others: Decide, **camera: Any) -> dict[str, Any]:
 
 
 def test_events_that_a_plan_names_end_it_at_the_next_step():
-    situations: list[Any] = []
+    situations = []
 
-    def decide(now: Situation) -> Plan:
-        situations.append((now.step, [(e.event, e.user) for e in now.events]))
+    def decide(now):
+        situations.append((now.step, [(e.event, e.user, e.x, e.y) for e in now.events]))
         return now.plan().interrupt_on("user_seen", "user_lost").stay()
 
     stored = fleet2d.run(watched(decide))
-    events = table(stored, "events", entity="astro")
-    sight_events = [
-        (step + 1, [(event, "ana")])
-        for step, event in zip(events["step"].tolist(), events["event"].tolist(), strict=True)
-    ]
-    assert [(0, []), *sight_events] == situations
+    events, seen = table(stored, "events", entity="astro"), table(stored, "observations")
     assert ["user_seen", "user_lost", "user_seen"] == events["event"].tolist()
-    assert events["step"][0] == 0
-
-
-def test_events_that_a_plan_does_not_name_leave_it_alone():
-    steps, decide = recording_steps(lambda now: now.plan().interrupt_on("user_lost").stay())
-    stored = fleet2d.run(watched(decide))
-    lost = table(stored, "events", event="user_lost")["step"].tolist()
-    assert [0, *(step + 1 for step in lost)] == steps
-
-
-def test_an_event_says_where_the_user_was_perceived_last():
-    events: list[Any] = []
-
-    def decide(now: Situation) -> Plan:
-        events.extend(now.events)
-        return now.plan().interrupt_on("user_seen", "user_lost").stay()
-
-    stored = fleet2d.run(watched(decide))
-    observations = table(stored, "observations")
-    lost_step = table(stored, "events", event="user_lost")["step"][0]
-    last = np.flatnonzero(observations["step"] <= lost_step)[-1]
-    assert [(1.0, 3.0), (observations["x"][last], observations["y"][last])] == [
-        (event.x, event.y) for event in events[:2]
-    ]
-
-
-def test_a_user_counts_as_lost_when_not_noticed_for_so_long():
-    for patience in (5, 20):
-        stored = fleet2d.run(watched(lambda now: now.plan().stay(), lost_after=f"{patience} s"))
-        steps = table(stored, "observations")["step"]
-        lost = table(stored, "events", event="user_lost")["step"].tolist()
-        gap = np.flatnonzero(np.diff(steps) > 5)
-        assert [steps[gap[0]] + patience] == lost
-
-
-def test_an_interrupted_body_goes_on_from_where_it_is():
-    def decide(now: Situation) -> Plan:
-        plan = now.plan().interrupt_on("user_lost", "user_seen")
-        return plan.go_to([1.0, 3.0] if now.events else [4.5, 0.6]).stay()
-
-    poses = path(fleet2d.run(watched(decide)), "astro")
-    assert np.hypot(np.diff(poses.x), np.diff(poses.y)).max() <= 0.6 + 2e-3
+    expected = [(0, [])]
+    for step, event in zip(events["step"].tolist(), events["event"].tolist(), strict=True):
+        last = np.flatnonzero(seen["step"] <= step)[-1]  # where she was perceived last
+        expected.append((step + 1, [(event, "ana", seen["x"][last], seen["y"][last])]))
+    assert expected == situations
 
 
 # --- What a behavior may not do ----------------------------------------------------------------
 
 
-def returns_the_same_plan_again() -> Decide:
-    plans: list[Plan] = []
+def returns_the_same_plan_again():
+    plans = []
 
-    def decide(now: Situation) -> Plan:
+    def decide(now):
         plans.append(minute(now))
         return plans[0]
 
@@ -363,29 +234,14 @@ def test_an_event_that_there_is_not_is_refused_with_those_there_are():
 
 
 def test_what_was_stored_before_a_failure_is_readable(tmp_path):
-    def decide(now: Situation) -> Plan:
+    def decide(now):
         assert now.step < 120, "enough"
         return minute(now)
 
     content = scenario(users={"ana": entity_with(decide)})
-    with pytest.raises(
-        ComponentError, match=r"users\.ana failed at step 120: AssertionError: enough"
-    ):
+    message = r"users\.ana failed at step 120: AssertionError: enough"
+    with pytest.raises(ComponentError, match=message):
         fleet2d.run(content, out=tmp_path / "run")
     stored = fleet2d.open_run(tmp_path / "run")
-    assert "failed" == stored.status
-    assert 120 == stored.manifest["steps"]
+    assert ("failed", 120) == (stored.status, stored.manifest["steps"])
     assert [0, 60] == table(stored, "trajectories")["step"].tolist()
-
-
-def test_a_start_that_fails_is_named_and_nothing_is_written(tmp_path):
-    class Broken(Behavior):
-        def start(self, actor: Any) -> None:
-            raise ValueError("not today")
-
-    content = scenario(users={"ana": {"behaviors": [Broken()]}})
-    with pytest.raises(
-        ComponentError, match=r"users\.ana failed when it was started: ValueError: not today"
-    ):
-        fleet2d.run(content, out=tmp_path / "run")
-    assert not (tmp_path / "run").exists()

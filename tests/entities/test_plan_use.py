@@ -1,14 +1,11 @@
 """Using objects: the way there, the last step onto them, postures, and getting up again."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 import shapely
 
 import fleet2d
-from fleet2d import Behavior, ComponentError, Situation
-from fleet2d.entities.plan import Plan
+from fleet2d import Behavior, ComponentError
 from fleet2d.floorplan.native import native_document
 from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
@@ -29,14 +26,14 @@ class Rest(Behavior):
     thing: str = "bed"
     place: int = 0
 
-    def decide(self, now: Situation) -> Plan:
+    def decide(self, now):
         from datetime import timedelta
 
         plan = now.plan().use(self.thing, self.place).stay(timedelta(seconds=60))
         return plan.go_to([0.5, 3.5]).stay()
 
 
-def simulation(tmp_path: Any, **behavior: Any) -> fleet2d.Simulation:
+def simulation(tmp_path, **behavior):
     import json
 
     room = [LabelledRegion(("bedroom",), shapely.box(0, 0, 6, 4))]
@@ -52,7 +49,7 @@ def simulation(tmp_path: Any, **behavior: Any) -> fleet2d.Simulation:
     )
 
 
-def where(sim: fleet2d.Simulation) -> tuple[float, float]:
+def where(sim):
     state = sim.state["ana"]
     return state["x"], state["y"]
 
@@ -64,53 +61,6 @@ def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path):
     assert sim.state["ana"]["heading"] == pytest.approx(np.pi, abs=0.002)
     plan = sim.actors["ana"].plan
     assert [0, 2] == [plan.posture_at(time_us) for time_us in (0, 30_000_000)]
-
-
-def test_body_has_the_posture_of_the_moment_in_a_plan_that_ends_standing(tmp_path):
-    sim = simulation(tmp_path)
-    sim.advance(30)
-    ana = sim.actors["ana"]
-
-    assert [0, 2, 0] == [ana.posture_code(seconds * 10**6) for seconds in (0, 30, 119)]
-
-
-def test_sleeper_gets_up_where_it_lay_down_and_walks_on_standing(tmp_path):
-    sim = simulation(tmp_path)
-    track = sim.actors["ana"].plan
-    sim.advance(1)
-    track = sim.actors["ana"].plan.finish().breakpoints  # type: ignore[attr-defined]
-    lattice = sim.home.plan.lattice
-    points = lattice.to_metres(np.stack([track.x, track.y], axis=1)).round(3).tolist()
-    lying = points.index([4.0, 2.2])
-    assert [4.0, 2.9] == points[lying - 1] or [4.0, 2.9] in points[:lying]
-    assert [4.0, 2.9] == next(p for p in points[lying:] if p != [4.0, 2.2])
-    end = sim.actors["ana"].plan
-    assert "stand" == end.posture
-
-
-def test_way_to_the_bed_goes_round_it(tmp_path):
-    sim = simulation(tmp_path)
-    sim.advance(1)
-    track = sim.actors["ana"].plan.finish().breakpoints  # type: ignore[attr-defined]
-    lattice = sim.home.plan.lattice
-    points = lattice.to_metres(np.stack([track.x, track.y], axis=1))
-    arrives = int(np.flatnonzero((np.abs(points - (4, 2.9)) < 0.001).all(axis=1))[0])
-    way = shapely.LineString(points[: arrives + 1])
-    assert way.distance(BED.footprint) >= 0.2
-
-
-def test_place_without_an_approach_is_stepped_to_from_beside_the_object(tmp_path):
-    sim = simulation(tmp_path, place=1)
-    sim.advance(30)
-    assert where(sim) == pytest.approx((4, 1.4), abs=1e-3)
-    sim.advance(89)
-    assert where(sim) == pytest.approx((0.5, 3.5), abs=1e-3)
-
-
-def test_use_is_told_in_the_events(tmp_path):
-    run = simulation(tmp_path).run()
-    rows = run.tables["events"].to_pylist()
-    assert [("uses", "bed")] == [(row["event"], row["detail"]) for row in rows]
 
 
 def test_object_without_a_place_is_refused(tmp_path):

@@ -1,8 +1,8 @@
 """What a real robot perceived, replayed: rows, events, algorithms, metrics, and what is refused."""
 
+import copy
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +13,13 @@ from fleet2d.errors import InputError
 HEAD = "time,label,x,y\n"
 
 
-def place(room: str) -> tuple[float, float]:
+def place(room):
     """Return a place in the middle of a room of the bundled home."""
     plan = fleet2d.load_floorplan()
     return next(r.anchor_xy for r in plan.rooms if r.name == room)
 
 
-def scenario(path: Path, **robot: Any) -> dict[str, Any]:
+def scenario(path, **robot):
     return {
         "extends": "bundled:paper",
         "simulation": {"duration": "1 h", "seed": 4},
@@ -38,7 +38,7 @@ def scenario(path: Path, **robot: Any) -> dict[str, Any]:
     }
 
 
-def detections(path: Path, rows: list[tuple[float, str, float, float]]) -> Path:
+def detections(path, rows):
     path.write_text(HEAD + "".join(f"{t},{who},{x},{y}\n" for t, who, x, y in rows))
     return path
 
@@ -50,17 +50,21 @@ def kitchen(tmp_path):
     return detections(tmp_path / "seen.csv", [*rows, (700.4, "person", x + 0.1, y)])
 
 
-def test_detections_are_the_observations_of_the_run(kitchen):
-    run = fleet2d.run(scenario(kitchen))
+def test_detections_are_the_observations_of_the_run(kitchen, tmp_path):
+    run = fleet2d.run(scenario(kitchen), out=tmp_path / "run")
 
     table = run.tables["observations"]
     x, _ = place("kitchen_1")
     assert table["step"].to_pylist() == [*range(600, 660), 700]
     assert table["user"].to_pylist() == ["ana"] * 60 + [None]
-    assert table["room"].to_pylist() == ["kitchen_1"] * 61
+    assert set(table["room"].to_pylist()) == {"kitchen_1"}
     assert np.allclose(table["x"].to_numpy(), [x] * 60 + [x + 0.1], atol=1e-3)
-    assert table["truth_known"].to_pylist() == [False] * 61
-    assert table["true_user"].to_pylist() == [None] * 61
+    assert set(table["truth_known"].to_pylist()) == {False}
+    assert set(table["true_user"].to_pylist()) == {None}
+    assert [Path(i["path"]).name for i in run.manifest["inputs"]] == ["seen.csv"]
+    assert run.metrics["detections"] == {"astro": {"unknown_truth": 61}}
+    assert run.metrics["rtp_score"] == {"ana": {"truth unknown": {"bins": 60}}}
+    assert run.metrics["sightings"] == {}
 
 
 def test_events_say_when_somebody_is_seen_and_lost(kitchen):
@@ -76,21 +80,6 @@ def test_events_say_when_somebody_is_seen_and_lost(kitchen):
     ]
 
 
-def test_algorithms_learn_from_it(kitchen):
-    run = fleet2d.run(scenario(kitchen))
-
-    last = [r for r in run.tables["ltp"].to_pylist() if r["user"] == "ana"][-1]
-    assert last["room"] == "kitchen_1" or run.tables["ltp"].num_rows
-
-
-def test_metrics_say_that_the_truth_is_unknown(kitchen):
-    metrics = fleet2d.run(scenario(kitchen)).metrics
-
-    assert metrics["detections"] == {"astro": {"unknown_truth": 61}}
-    assert metrics["rtp_score"] == {"ana": {"truth unknown": {"bins": 60}}}
-    assert metrics["sightings"] == {}
-
-
 def test_known_truth_and_real_sightings_score_the_belief(tmp_path, kitchen):
     x, y = place("kitchen_1")
     truth = tmp_path / "uwb.csv"
@@ -100,29 +89,21 @@ def test_known_truth_and_real_sightings_score_the_belief(tmp_path, kitchen):
 
     metrics = fleet2d.run(content).metrics
 
-    scores = metrics["rtp_score"]["ana"]
-    assert scores["all"]["bins"] + scores["truth unknown"]["bins"] == 60
-    assert scores["truth unknown"]["bins"] == 31
-    assert "never seen" not in scores
+    bins = {gap: scores["bins"] for gap, scores in metrics["rtp_score"]["ana"].items()}
+    assert (bins["all"], bins["truth unknown"]) == (29, 31)
+    assert "never seen" not in bins
     assert metrics["sightings"]["ana"] == pytest.approx(60 / 1771, rel=0.01)
 
 
-def test_every_span_length_gives_the_same_run(kitchen):
+def test_every_span_length_and_a_copy_give_the_same_run(kitchen):
     content = scenario(kitchen)
     content["robots"]["astro"]["behaviors"] = [{"type": "opportunistic"}, {"type": "patrol"}]
+    simulation = fleet2d.Simulation(content)
+    simulation.advance(630)
 
     digests = {fleet2d.run(content, max_span=span).digest for span in (1, 7, None)}
 
-    assert len(digests) == 1
-
-
-def test_a_checkpoint_continues_with_the_same_detections(kitchen):
-    import copy
-
-    simulation = fleet2d.Simulation(scenario(kitchen))
-    simulation.advance(630)
-
-    assert copy.deepcopy(simulation).run().digest == fleet2d.run(scenario(kitchen)).digest
+    assert digests == {copy.deepcopy(simulation).run().digest}
 
 
 def test_positions_in_the_frame_of_the_robot_turn_with_it(tmp_path):
@@ -132,51 +113,31 @@ def test_positions_in_the_frame_of_the_robot_turn_with_it(tmp_path):
 
     run = fleet2d.run(content)
 
-    poses = run.path("astro", every=timedelta(seconds=10))
-    table = run.tables["observations"]
-    cos, sin = np.cos(poses.heading[:60]), np.sin(poses.heading[:60])
-    assert np.allclose(table["x"].to_numpy(), poses.x[:60] + cos - 0.5 * sin, atol=2e-3)
-    assert np.allclose(table["y"].to_numpy(), poses.y[:60] + sin + 0.5 * cos, atol=2e-3)
-
-
-def test_the_frame_moves_positions(kitchen, tmp_path):
-    x, y = place("kitchen_1")
-    path = detections(tmp_path / "moved.csv", [(0, "ana", x - 2, y + 1)])
-
-    run = fleet2d.run(scenario(path, frame={"origin": [2, -1]}))
-
-    assert run.tables["observations"]["room"].to_pylist() == ["kitchen_1"]
+    poses, table = run.path("astro", every=timedelta(seconds=10)), run.tables["observations"]
+    robot = poses.x[:60] + 1j * poses.y[:60]
+    seen = robot + (1 + 0.5j) * np.exp(1j * poses.heading[:60])
+    assert np.allclose(table["x"].to_numpy() + 1j * table["y"].to_numpy(), seen, atol=3e-3)
 
 
 def test_few_detections_outside_are_left_out_and_counted(tmp_path):
     x, y = place("kitchen_1")
-    rows = [(t, "ana", x, y) for t in range(9)] + [(9, "ana", -40.0, y)]
+    rows = [(t, "ana", x - 2, y + 1) for t in range(9)] + [(9, "ana", -44.0, y)]
     path = detections(tmp_path / "seen.csv", rows)
 
-    run = fleet2d.run(scenario(path))
+    run = fleet2d.run(scenario(path, frame={"origin": [2, -1]}))
 
-    assert run.tables["observations"].num_rows == 9
+    assert run.tables["observations"]["room"].to_pylist() == ["kitchen_1"] * 9
     notes = " ".join(run.manifest["notes"])
     assert "1 of 10 detections are outside the home and left out, by up to 4" in notes
-
-
-@pytest.mark.parametrize("turn", [90.0, 180.0])
-def test_a_frame_that_is_turned_is_refused_with_its_distance(tmp_path, turn):
-    x, y = place("kitchen_1")
-    path = detections(tmp_path / "seen.csv", [(float(t), "ana", x, y) for t in range(9)])
-
-    with pytest.raises(
-        InputError, match=r"9 of 9 detections are more than 1 m outside, by \d+\.\d m"
-    ):
-        fleet2d.Simulation(scenario(path, frame={"rotation_deg": turn}))
 
 
 @pytest.mark.slow
 def test_a_frame_off_by_a_metre_is_told_where_it_leads_through_walls(tmp_path):
     """Within the reach of a metre nothing is left out, but what is in walls is counted."""
     x, y = place("kitchen_1")
+    plan = fleet2d.load_floorplan()
     rows = [(t, "ana", x + t / 10 - 4, y) for t in range(80)]  # through the walls beside
-    inside = [row for row in rows if fleet2d.load_floorplan().room_at(*row[2:]) is not None]
+    inside = [row for row in rows if plan.room_at(*row[2:]) is not None]
     path = detections(tmp_path / "seen.csv", inside)
 
     notes = " ".join(fleet2d.Simulation(scenario(path, frame={"origin": [0.6, 0.6]})).notes)
@@ -199,31 +160,17 @@ def test_what_is_from_before_the_run_is_left_out_and_counted(kitchen):
     ("rows", "options", "message"),
     [
         ([(0, "ana", 80.0, 80.0)], {}, "the frame of"),
-        (
-            [(0, "anna", 1.0, 1.0)],
-            {},
-            "no user is named 'anna' (1 detections): say who it is by people: {anna: NAME}",
-        ),
+        ([(0, "anna", 1.0, 1.0)], {}, r"named 'anna' \(1 detections\): say who .*people: {anna: NAME}"),
         ([(0, "ana", 1.0, 1.0)], {"people": {"f7": "ana"}}, "people: the log has no label 'f7'"),
         ([(0, "f7", 1.0, 1.0)], {"people": {"f7": "anna"}}, "people: there is no user 'anna'"),
-        (
-            [(90000, "ana", 1.0, 1.0), (90001, "ana", 1.0, 1.0)],
-            {},
-            "the log is from 2026-01-06 01:00:00 to 2026-01-06 01:00:01, the run from 2026-01-05 00:00:00",
-        ),
-        (
-            [(0, "ana", 1.0, 1.0)],
-            {"day": 3},
-            "the run begins on day 3 of the log, which has the days 0 to 0",
-        ),
+        ([(90000, "ana", 1.0, 1.0)], {}, "the log is from 2026-01-06 01:00:00 to .*, the run from 2026-01-05"),
+        ([(0, "ana", 1.0, 1.0)], {"day": 3}, "day 3 of the log, which has the days 0 to 0"),
+        ([(0, "ana", 9.0, 4.0)], {"frame": {"rotation_deg": 90}}, r"1 of 1 detections are more than 1 m outside, by \d+\.\d m"),
     ],
-)
+)  # fmt: skip
 def test_a_log_that_does_not_fit_is_refused(tmp_path, rows, options, message):
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match=f"robots.astro.perceives: .*{message}"):
         fleet2d.Simulation(scenario(detections(tmp_path / "seen.csv", rows), **options))
-
-    assert "robots.astro.perceives: " in str(caught.value)
-    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -241,31 +188,7 @@ def test_a_robot_perceives_in_one_way(kitchen, change, message):
         fleet2d.Simulation(content)
 
 
-def test_there_must_be_users(kitchen):
-    content = scenario(kitchen) | {
-        "users": {"ana": None},
-        "algorithms": {"ltp": None},
-        "metrics": {},
-    }
-
-    with pytest.raises(InputError, match="there are no users to be perceived"):
-        fleet2d.Simulation(content)
-
-
-def test_its_camera_cannot_be_disturbed(kitchen):
-    simulation = fleet2d.Simulation(scenario(kitchen))
-
-    with pytest.raises(InputError, match="its cameras can't be changed"):
-        simulation.do({"switch_off": "astro", "camera": True})
-
-
-def test_the_log_is_an_input_of_the_run(kitchen, tmp_path):
-    run = fleet2d.run(scenario(kitchen), out=tmp_path / "run")
-
-    assert [Path(i["path"]).name for i in run.manifest["inputs"]] == ["seen.csv"]
-
-
-def both_ways(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+def both_ways(folder):
     """Return a scenario whose robot perceives somebody by a table, and the same by a script."""
     x, y = place("kitchen_1")
     steps = [600, 601, 602, 1500, 1501, 2400]
@@ -286,10 +209,3 @@ def test_detections_besides_the_cameras_are_injected_ones(tmp_path):
     assert table.tables["observations"].num_rows > 6
     for name in ("observations", "events", "key_frames"):
         assert table.tables[name].to_pylist() == script.tables[name].to_pylist()
-
-
-def test_detections_besides_the_cameras_are_the_same_for_every_span(tmp_path):
-    content, _ = both_ways(tmp_path)
-    content["robots"]["astro"]["perception"] = {"detection": {"posture": {"sit": 0.5}}}
-
-    assert len({fleet2d.run(content, max_span=span).digest for span in (7, 600, None)}) == 1

@@ -1,13 +1,10 @@
 """What the tests of robots' behaviors share."""
 
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 from tests.scenes import digests, path, run, scenario, table
 from tests.thorough import some
-
-from fleet2d.runs.run import Run
 
 CAMERA = {"range": [0.2, 4.5], "angle_deg": 108, "lost_after": "5 s"}
 SIT = {"days": [{"items": [{"at": "00:00", "place": [7.0, 6.0]}]}]}
@@ -15,9 +12,7 @@ OUT = {"type": "schedule", "days": [{"items": [{"at": "00:00", "away": True}]}]}
 SHARE = {"share": {"type": "tests.own_components:Share", "period": "5 min"}}
 
 
-def home_with(
-    behaviors: list[Any], duration: str = "1 h", ana: Any = None, **sections: Any
-) -> dict[str, Any]:
+def home_with(behaviors, duration="1 h", ana=None, **sections):
     """The flat with a robot, and Ana, who is in the bathroom all day unless told otherwise."""
     ana = {"type": "schedule", **SIT} if ana is None else ana
     astro = {
@@ -30,7 +25,7 @@ def home_with(
     return scenario(duration, users={"ana": ana}, robots={"astro": astro}, **sections)
 
 
-def events(stored: Run, entity: str = "astro") -> list[tuple[int, str, str]]:
+def events(stored, entity="astro"):
     """The events of a body: step, event, detail."""
     rows = table(stored, "events", entity=entity)
     return list(
@@ -38,12 +33,12 @@ def events(stored: Run, entity: str = "astro") -> list[tuple[int, str, str]]:
     )
 
 
-def names(stored: Run) -> list[str]:
+def names(stored):
     """The events of the robot but those of its camera."""
     return [name for _, name, _ in events(stored) if name not in ("user_seen", "user_lost")]
 
 
-def rooms(stored: Run, still_s: int = 20) -> list[str]:
+def rooms(stored, still_s=20):
     """The rooms in which the robot stood still, in order."""
     poses = path(stored, "astro")
     names_of_rooms = []
@@ -54,7 +49,7 @@ def rooms(stored: Run, still_s: int = 20) -> list[str]:
     return [room for room, _ in groupby(names_of_rooms)]
 
 
-def rooms_of(stored: Run, entity: str = "astro") -> list[str]:
+def rooms_of(stored, entity="astro"):
     """The room that a body is in at each step."""
     poses = path(stored, entity)
     points = np.stack([poses.x, poses.y], axis=1)
@@ -65,7 +60,7 @@ def rooms_of(stored: Run, entity: str = "astro") -> list[str]:
     return [known[xy] for xy in map(tuple, points.tolist())]
 
 
-def assert_same_for_every_max_span(content: dict[str, Any], *spans: int) -> Run:
+def assert_same_for_every_max_span(content, *spans):
     """A run is the same however it is cut into spans; returns it."""
     whole = run(content)
     for span in some(spans or (61, 1), 2):

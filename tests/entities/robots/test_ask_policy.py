@@ -1,72 +1,48 @@
 """Ask policies: what they observe, which requests they may serve, and what the robot does then."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from tests.entities.robots.test_interact import ana, events_of, home
-from tests.scenes import digests, run
+from tests.entities.robots.test_interact import ana, home
+from tests.scenes import run
 
 from fleet2d import Simulation
 from fleet2d.engine.access import run_until_asked, situation_of
 from fleet2d.entities.robots.ask_policy import ASK_COLUMNS, AskPolicy
 from fleet2d.errors import ComponentError, InputError
-from fleet2d.kernels import F32, Bool
-from fleet2d.runs.run import Run
 
 AT = {name: number for number, name in enumerate(ASK_COLUMNS)}
 PILL = {"do": "remind", "to": "ana", "at": ["07:10"], "within": "1 h", "worth": 4, "takes": "30 s"}
 TEA = {"do": "offer", "to": "ana", "at": ["07:20"], "within": "1 h", "worth": 1, "takes": "30 s"}
 
 
-OBSERVED: list[F32] = []
+OBSERVED = []
 
 
 class First(AskPolicy):
     """Serve the first request that may be served, and keep what was observed."""
 
-    def act(self, observation: F32, mask: Bool) -> int:
+    def act(self, observation, mask):
         OBSERVED.append(observation)
         return int(mask.argmax())
 
 
-def asking(*behaviors: dict[str, Any], duration: str = "2 h", **changes: Any) -> dict[str, Any]:
+def asking(*behaviors, duration="2 h", **changes):
     own = {"type": "tests.entities.robots.test_ask_policy:First", "requests": 3}
     astro = {"behaviors": list(behaviors) or [own, {"type": "patrol"}]}
     changes = {"interactions": {"pill": PILL, "tea": TEA}, "robots": {"astro": astro}} | changes
     return home(duration, **changes)
 
 
-def choices(content: dict[str, Any], choose: Any) -> tuple[Simulation, list[tuple[str, F32, Bool]]]:
+def choices(content, choose):
     """Let a function of observation and mask choose; return times, observations and masks."""
     simulation = Simulation(content)
     rows = []
     while run_until_asked(simulation, "astro"):
-        behavior: Any = simulation.actors["astro"].behaviors[0]
+        behavior = simulation.actors["astro"].behaviors[0]
         now = situation_of(simulation, "astro")
         rows.append((f"{now.time:%H:%M}", behavior.observe(now), behavior.mask(now)))
         behavior.given = choose(*rows[-1][1:])
     return simulation, rows
-
-
-def test_the_request_that_was_chosen_is_served():
-    stored = run(asking())
-
-    kinds = [kind for _, kind in events_of(stored)]
-    assert ["due", "asks", "accepted", "delivered"] == kinds[:4]
-    assert 2 == kinds.count("accepted")
-
-
-@pytest.mark.slow
-def test_spans_are_invisible():
-    def life(**settings: Any) -> Run:
-        outcomes = ("sent_away", "accepted")
-        return run(asking(users={"ana": ana(outcomes=outcomes)}), **settings)
-
-    whole = life()
-
-    assert "sent_away" in [kind for _, kind in events_of(whole)]
-    assert digests(whole) == digests(life(max_span=61)) == digests(life(max_span=1))
 
 
 @pytest.mark.parametrize(
@@ -75,7 +51,7 @@ def test_spans_are_invisible():
 def test_actions_from_outside_repeat_the_run_of_the_policy(outcomes):
     """Also where it is sent away, so that an order interrupts its question."""
 
-    def life() -> dict[str, Any]:
+    def life():
         people = {"ana": ana(outcomes=outcomes), "ben": ana("living_room")}
         interactions = {"pill": PILL, "tea": {**TEA, "to": "ben", "at": ["07:10"]}}
         return asking(users=people, interactions=interactions)
@@ -131,7 +107,7 @@ def test_observation_is_of_the_queue_and_the_answers():
 def test_impossible_action_is_an_error_with_the_reason(action, reason):
     simulation = Simulation(asking({"type": "ask_policy", "requests": 3}))
     run_until_asked(simulation, "astro")
-    behavior: Any = simulation.actors["astro"].behaviors[0]
+    behavior = simulation.actors["astro"].behaviors[0]
     now = situation_of(simulation, "astro")
     with pytest.raises(InputError, match=reason):
         behavior.check(now, action, behavior.mask(now))
@@ -140,8 +116,3 @@ def test_impossible_action_is_an_error_with_the_reason(action, reason):
 def test_more_interactions_than_rows_are_refused():
     with pytest.raises(ComponentError, match=r"2 interactions.*set requests: 2"):
         run(asking({"type": "ask_policy", "requests": 1}))
-
-
-def test_policy_without_a_file_says_what_to_give():
-    with pytest.raises(ComponentError, match="derive a class from AskPolicy"):
-        run(asking({"type": "ask_policy"}))

@@ -1,6 +1,5 @@
 """Explore: all floor that can be seen is seen, frontier by frontier."""
 
-import numpy as np
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, names
 from tests.scenes import path
@@ -27,35 +26,12 @@ def test_it_sees_the_whole_flat_and_then_leaves_the_robot_to_others():
     assert "kitchen_1" == stored.plan.room_at(float(poses.x[-1]), float(poses.y[-1])).name
 
 
-def test_the_share_is_that_of_the_layer():
-    simulation = fleet2d.Simulation(home_with(["explore"], "15 min"))
-    simulation.run_until(simulation.clock.steps)
-    explored = simulation.home.layers["explored.astro"].values
-    floor = simulation.actors["astro"].behaviors[0].floor  # type: ignore[attr-defined]
-    share = 100 * np.count_nonzero(explored & floor) / np.count_nonzero(floor)
-    stored = simulation.finish()
-    detail = next(detail for _, name, detail in events(stored) if name == "explored")
-    assert share == pytest.approx(float(detail.split(" ")[0]), abs=0.1)
-
-
 def test_what_can_not_be_seen_is_given_up():
     near_sighted = {"camera": {"range": [1.5, 3.0], "angle_deg": 60}}
     stored = assert_same_for_every_max_span(
         home_with([{"type": "explore", "enough": 1}], "1 h", astro=near_sighted), 61
     )
     assert "explored" == names(stored)[-1]
-
-
-@pytest.mark.parametrize("furnish", [False, True])
-def test_a_real_home_is_explored_in_minutes(furnish):
-    content = home_with(["explore"], "10 min")
-    content["floorplan"] = {"type": "bundled", "furnish": furnish}
-    content["users"] = {}
-    content["robots"]["astro"].pop("start")
-    stored = fleet2d.run(content)
-    assert "explored" == names(stored)[-1]
-    assert float(events(stored)[-1][2].split(" ")[0]) > 95
-    assert names(stored).count("explores") < 40
 
 
 def test_behind_a_shut_door_it_goes_on_once_that_is_open():

@@ -1,18 +1,14 @@
 """Rooms that behaviors stay out of: `no_stops_in` of all behaviors of robots but hangout."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 from tests.scenes import DOORS, scenario, table, write_flat
 
 import fleet2d
 from fleet2d.errors import PlacementError, ScenarioError
-from fleet2d.floorplan.load import load_floorplan
 from fleet2d.interventions import Call
 
 CAMERA = {"range": [0.2, 6], "angle_deg": 340}
-BEHAVIORS: dict[str, dict[str, Any]] = {
+BEHAVIORS = {
     "patrol": {"type": "patrol", "rooms": ["kitchen", "living_room"], "dwell": "10 s"},
     "find": {"type": "find", "user": "ana", "every": "3 min", "distance": 0.5},
     "follow": {"type": "follow", "user": "ana", "distance": 0.5},
@@ -23,7 +19,7 @@ BEHAVIORS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-def inside(behavior: str, avoid: list[str]) -> int:
+def inside(behavior, avoid):
     """Return for how many steps the robot is in the kitchen, where Ana stays."""
     rest = {"type": "patrol", "waypoints": [[4.4, 3.1], [1.0, 3.0]], "dwell": "20 s"}
     content = scenario(
@@ -71,7 +67,7 @@ def loop(monkeypatch, tmp_path):
     return write_flat(tmp_path)
 
 
-def docking(plan: Path, **dock: Any) -> set[str]:
+def docking(plan, **dock):
     """Return through which of two rooms a robot drives from the bathroom to its charger."""
     robot = {
         "start": [7.0, 6.0],
@@ -103,16 +99,3 @@ def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note():
     note = "scheduled.visits: left out, because of `no_stops_in`: those of kitchen_1"
     assert [note] == simulation.actors["astro"].notes
     assert ["bedroom_1"] == table(simulation.run(), "events", event="visits")["detail"].tolist()
-
-
-def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data):
-    file = shared_data / "valetudo" / "dreame_z10_named_rooms_and_paths.json"
-
-    def points(avoid: list[str]) -> int:
-        robot = {"behaviors": [{"type": "retrace", "path": str(file), "no_stops_in": avoid}]}
-        content = scenario(robots={"astro": robot})
-        content["floorplan"] = {"type": "valetudo", "path": str(file)}
-        return int(table(fleet2d.run(content), "events", event="retraces")["detail"][0].split()[0])
-
-    kinds = sorted({room.type for room in load_floorplan(file).rooms})
-    assert points([kinds[0]]) < points([])

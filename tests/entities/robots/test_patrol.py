@@ -1,7 +1,6 @@
 """Patrol: rounds through rooms and along waypoints."""
 
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,12 +8,9 @@ from tests.scenes import path, run, scenario
 
 import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.runs.run import Run
-
-REACHABLE = ["living_room_1", "kitchen_1", "bedroom_1", "bathroom_1"]
 
 
-def patrol(duration: str = "1 h", **fields: Any) -> dict[str, Any]:
+def patrol(duration="1 h", **fields):
     robot = {
         "type": "patrol",
         "dwell": "1 min",
@@ -25,7 +21,7 @@ def patrol(duration: str = "1 h", **fields: Any) -> dict[str, Any]:
     return scenario(duration, robots={"astro": robot})
 
 
-def stops(stored: Run, still_s: int = 55) -> list[tuple[float, float, int]]:
+def stops(stored, still_s=55):
     """Where it stood for long, in order: x, y and for how many steps."""
     poses = path(stored, "astro")
     stops = []
@@ -38,8 +34,8 @@ def stops(stored: Run, still_s: int = 55) -> list[tuple[float, float, int]]:
     return stops
 
 
-def room_names(stored: Run) -> list[str]:
-    return [stored.plan.room_at(x, y).name for x, y, _ in stops(stored)]  # type: ignore[union-attr]
+def room_names(stored):
+    return [stored.plan.room_at(x, y).name for x, y, _ in stops(stored)]
 
 
 def test_it_stops_in_every_room_in_turn_for_the_dwell():
@@ -49,24 +45,6 @@ def test_it_stops_in_every_room_in_turn_for_the_dwell():
     assert ["kitchen_1", "bathroom_1", "living_room_1"] * 2 == visited[:6]
     for x, y, count in stops(stored)[:-1]:
         assert 60 <= count <= 62, (x, y)
-
-
-def test_all_rooms_are_those_that_it_can_enter():
-    names = room_names(run(patrol()))
-    assert set(REACHABLE) <= set(names) <= {*REACHABLE, "unknown_1"}
-    assert names[: len(set(names))] == sorted(set(names), key=names.index)
-
-
-def test_it_stops_at_the_same_place_of_a_room_each_round():
-    places = stops(run(patrol(rooms=["kitchen", "bedroom"])))
-    assert 2 == len({place[:2] for place in places})
-    assert len(places) > 10
-
-
-def test_it_stands_at_the_middle_of_a_room():
-    stored = run(patrol("10 min", rooms=["bedroom"]))
-    (x, y), *_ = [place[:2] for place in stops(stored)]
-    assert (x, y) == pytest.approx(stored.plan.room("bedroom_1").anchor_xy, abs=0.1)
 
 
 def test_waypoints_are_met_exactly():
@@ -101,12 +79,7 @@ def test_random_order_visits_all_in_each_round_in_changing_order():
     assert len({tuple(r) for r in rounds}) > 5
 
 
-def test_a_room_named_twice_is_visited_once_a_round():
-    names = room_names(run(patrol(rooms=["kitchen", ["kitchen_1", "any"], "bedroom"])))
-    assert ["kitchen_1", "bedroom_1"] * 2 == names[:4]
-
-
-def bent(**fields: Any) -> dict[str, Any]:
+def bent(**fields):
     """A synthetic home in which a part of a bedroom is out of view from the middle of it."""
     return {
         **scenario("5 min"),
@@ -126,12 +99,6 @@ def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does():
     by_view = fleet2d.Simulation(bent(stop_at="view")).actors["astro"]
     assert [] == by_view.notes
     assert len(by_view.behaviors[0].stops) >= len(by_middle.behaviors[0].stops)
-
-
-def test_a_robot_that_also_does_something_else_is_not_warned():
-    content = bent()
-    content["robots"]["astro"]["behaviors"].append({"type": "hangout"})
-    assert [] == fleet2d.Simulation(content).actors["astro"].notes
 
 
 def test_a_round_that_takes_no_time_does_not_hang_the_run():

@@ -1,15 +1,13 @@
 """Population: what many people do at each hour is what the survey found."""
 
-import copy
 import statistics
 from collections import Counter
-from datetime import date, timedelta
+from datetime import date
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from tests.routines.days import MONDAY
-from tests.scenes import run, scenario, table
+from tests.scenes import scenario
 from tests.thorough import THOROUGH
 
 from fleet2d.engine.simulation import Simulation
@@ -17,16 +15,15 @@ from fleet2d.errors import InputError
 from fleet2d.routines import survey
 from fleet2d.routines.interruptions import without_interruptions
 from fleet2d.routines.planner import RESUMES
-from fleet2d.runtime.determinism import Draws, stream_key
 
 HOUR = 3600
 
 
-def users(count: int, **fields: Any) -> dict[str, Any]:
+def users(count, **fields):
     return {f"user_{i}": {"type": "population", **fields} for i in range(count)}
 
 
-def apart(counts: Counter[str], target: dict[str, float]) -> float:
+def apart(counts, target):
     """The total variation distance of counted shares from the survey's."""
     total = sum(counts.values())
     return sum(abs(counts[c] / total - share) for c, share in target.items()) / 2
@@ -37,7 +34,7 @@ def test_shares_of_many_people_follow_the_survey_hour_by_hour():
     simulation = Simulation(
         scenario("5 min", users=users(1000 if THOROUGH else 300, group="workers"))
     )
-    counts: dict[tuple[str, int], Counter[str]] = {}
+    counts = {}
     for actor in simulation.actors.values():
         for ordinal in range(MONDAY, MONDAY + 7):
             kind = "weekend" if date.fromordinal(ordinal).weekday() > 4 else "weekday"
@@ -78,45 +75,6 @@ def test_hardly_a_day_of_the_retired_has_no_meal_at_home():
     ]
     assert meals.count(0) < 0.06 * len(meals)
     assert 2 < statistics.mean(meals) < 3
-
-
-def test_an_hour_of_television_lasts_as_long_as_in_the_survey():
-    group = survey.group("retired")
-    lasted = []
-    for person in range(60):
-        key = stream_key(4, f"users.{person}", "day")
-        state = survey.first_state(group, Draws(key, 0), MONDAY)
-        for ordinal in range(MONDAY, MONDAY + 14):
-            episodes, state = survey.draw_episodes(group, Draws(key, ordinal), ordinal, state)
-            lasted += [b.end - b.begin for b in episodes if b.category == "tv"]
-    target = group.facts["minutes"]["tv"] * 60
-    assert target == pytest.approx(statistics.mean(lasted), rel=0.35)
-    # A geometric law has a standard deviation as large as its mean.
-    assert statistics.pstdev(lasted) < 0.9 * statistics.mean(lasted)
-
-
-def test_asking_for_a_day_again_or_from_a_branch_gives_the_same():
-    simulation = Simulation(scenario("5 min", users=users(1)))
-    behavior = simulation.actors["user_0"].behaviors[0]
-    third = behavior.day(MONDAY + 3)
-    assert third == copy.deepcopy(simulation).actors["user_0"].behaviors[0].day(MONDAY + 3)
-    behavior.day(MONDAY + 9)
-    assert third == behavior.day(MONDAY + 3)
-
-
-def test_groups_are_drawn_by_their_shares():
-    simulation = Simulation(scenario("5 min", users=users(200)))
-    drawn = Counter(a.behaviors[0].people.name for a in simulation.actors.values())
-    for name in survey.groups():
-        share = survey.table()["groups"][name]["share"] / 10_000
-        assert share == pytest.approx(drawn[name] / 200, abs=0.08)
-
-
-def test_people_of_the_survey_live_in_the_home():
-    stored = run(scenario("3 d", users=users(3, group="at_home")))
-    details = set(table(stored, "events", event="activity")["detail"])
-    assert {"sleep", "cook", "tv", "toilet", "wash_hands", "drink"} <= details
-    assert timedelta(days=3).total_seconds() == stored.manifest["steps"]
 
 
 def test_a_group_that_is_none_is_refused():

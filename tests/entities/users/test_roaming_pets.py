@@ -1,7 +1,5 @@
 """Pet: it naps and roams where it may."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.scenes import path, run, scenario
@@ -12,7 +10,7 @@ from fleet2d.errors import InputError
 ROOMS = ["kitchen", "living_room"]
 
 
-def cat(duration: str = "1 d", **fields: Any) -> dict[str, Any]:
+def cat(duration="1 d", **fields):
     return scenario(duration, users={"rex": {"type": "pet", "radius": 0.1, **fields}})
 
 
