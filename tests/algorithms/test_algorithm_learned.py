@@ -1,6 +1,5 @@
 """What an algorithm has learned: kept, recalled in another run, refused where it doesn't fit."""
 
-from collections.abc import Mapping
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, ClassVar
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 from tests.scenes import TESTS, everything, run
 
-from fleet2d import Algorithm, History, Home, Present
+from fleet2d import Algorithm
 from fleet2d.algorithms.algorithm import load_learned, save_learned
 from fleet2d.errors import ComponentError, InputError
 
@@ -19,11 +18,11 @@ HERE = f"{TESTS.as_posix()}/algorithms/test_algorithm_learned"
 class Counts(Algorithm):
     """Counts sightings per room, and keeps some more."""
 
-    def start(self, home: Home) -> None:
+    def start(self, home):
         self.counts = np.zeros(len(home.rooms))
         self.more: dict[str, Any] = {"days": 0, "by_hour": {"noon": np.arange(3)}, "word": "x"}
 
-    def update(self, history: History, state: Present) -> Mapping[str, Any]:
+    def update(self, history, state):
         self.counts += np.bincount(history.observations.room, minlength=len(self.counts))
         self.more["days"] += 1
         return {"counts": self.counts, "days": np.full(len(self.counts), self.more["days"])}
@@ -32,10 +31,10 @@ class Counts(Algorithm):
 class Hoards(Algorithm):
     """Keeps what no file can hold."""
 
-    def start(self, home: Home) -> None:
+    def start(self, home):
         self.queue = object()
 
-    def update(self, history: History, state: Present) -> None:
+    def update(self, history, state):
         """Do nothing."""
 
 
@@ -45,14 +44,14 @@ class LooksBack(Algorithm):
     looks_back: ClassVar[timedelta] = timedelta(minutes=30)
     minutes: int = 30
 
-    def update(self, history: History, state: Present) -> Mapping[str, Any]:
+    def update(self, history, state):
         first = max(0, history.first - 60 * self.minutes)
         wide = history.between(first, history.end)
         return {"steps": len(wide), "moved": wide.poses("astro").distance,
                 "seen": len(wide.observations.step)}  # fmt: skip
 
 
-def content(what: str, **more: Any) -> dict[str, Any]:
+def content(what, **more):
     return {
         **everything("1 h"),
         "algorithms": {"mine": {"type": f"{HERE}:{what}", "period": "10 min", **more}},

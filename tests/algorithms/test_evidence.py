@@ -1,13 +1,13 @@
 """Evidence: what was watched and who was perceived there, minute by minute."""
 
-from collections.abc import Mapping, Set
-from typing import Any, ClassVar
+from collections.abc import Set
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from tests.scenes import TESTS, everything, run
 
-from fleet2d import Algorithm, History, Present
+from fleet2d import Algorithm
 from fleet2d.algorithms.evidence import SightingCounts, steps_of_bin
 from fleet2d.algorithms.observations import PlacedSightings
 from fleet2d.errors import ComponentError
@@ -20,7 +20,7 @@ class Tell(Algorithm):
 
     needs: ClassVar[Set[str]] = {"evidence", "exposure"}
 
-    def update(self, history: History, state: Present) -> Mapping[str, Any]:
+    def update(self, history, state):
         evidence = history.evidence
         plan = state.home.plan
         cells = np.bincount(plan.room_of_cell[plan.room_of_cell >= 0])
@@ -42,11 +42,11 @@ class Tell(Algorithm):
 class Unsaid(Algorithm):
     """Asks for evidence without having said so."""
 
-    def update(self, history: History, state: Present) -> Any:
+    def update(self, history, state):
         return {"bins": len(history.evidence)}
 
 
-def sightings(rows: list[tuple[int, int, int]]) -> PlacedSightings:
+def sightings(rows):
     """Return observations of (step, user, room)."""
     step, user, room = np.array(rows, np.int64).reshape(-1, 3).T.copy()
     return PlacedSightings(step, np.arange(len(rows), dtype=np.int32), user, room)
@@ -71,7 +71,7 @@ def test_nobody_perceived_is_evidence_of_zeros():
     assert 0 == SightingCounts.of_observations(sightings([]), 60, (3, 2, 2)).dense.sum()
 
 
-def evidence_of(period: str, what: str = "Tell", **settings: Any) -> Any:
+def evidence_of(period, what="Tell", **settings):
     content = everything("1 h")
     content["robots"] = {"astro": content["robots"]["astro"]}
     content["algorithms"] = {"tell": {"type": f"{HERE}:{what}", "period": period}}

@@ -1,19 +1,12 @@
 """What a robot can know as a table: complete, at its own time, and nothing that isn't perceived."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 import fleet2d
-from fleet2d.runs.run import Run
 
 
-def table(run: Run) -> dict[str, Any]:
-    return {name: column.to_numpy() for name, column in run.arrow("evidence").to_pydict().items()}
-
-
-def simulated(*overrides: str, **settings: Any) -> Run:
+def simulated(*overrides, **settings):
     return fleet2d.run(
         "bundled:paper",
         "simulation.duration=6 h",
@@ -30,17 +23,8 @@ def run():
     return simulated()
 
 
-def columns(run: Run, name: str = "evidence") -> dict[str, np.ndarray[Any, Any]]:
+def columns(run, name="evidence"):
     return {k: np.array(v, object) for k, v in run.arrow(name).to_pydict().items()}
-
-
-def test_rows_are_of_the_bins_own_time(run):
-    rows = columns(run)
-
-    minutes = rows["bin"].astype(int) // 60 + 6 * 60
-    assert np.array_equal(minutes % 1440, rows["minute"].astype(int))
-    assert set(rows["day"]) == {np.datetime64("2026-01-05").astype(object).toordinal()}
-    assert (np.diff(rows["bin"].astype(int)) >= 0).all()
 
 
 def test_sightings_are_those_of_the_observations(run):

@@ -1,15 +1,12 @@
 """Beliefs of a real algorithm, replayed from a table: newest shares, rooms, people, errors."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
 
 
-def scenario(path: Path, **settings: Any) -> dict[str, Any]:
+def scenario(path, **settings):
     return {
         "extends": "bundled:paper",
         "simulation": {"duration": "4 h", "seed": 4},
@@ -19,7 +16,7 @@ def scenario(path: Path, **settings: Any) -> dict[str, Any]:
     }
 
 
-def write(folder: Path, text: str) -> Path:
+def write(folder, text):
     path = folder / "belief.csv"
     path.write_text(text)
     return path
@@ -34,7 +31,7 @@ ROWS = """time,user,room,share
 """
 
 
-def shares(run: Any, room: str) -> list[float]:
+def shares(run, room):
     return [r["share"] for r in run.tables["ltp"].to_pylist() if r["room"] == room]
 
 

@@ -4,6 +4,7 @@ import copy
 from datetime import datetime, timedelta
 
 import numpy as np
+import polars as pl
 import pytest
 
 from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence, slot_of_week
@@ -13,7 +14,7 @@ from fleet2d.errors import ComponentError
 NOON = datetime(2026, 1, 5, 12)
 
 
-def some(**changes) -> Presence:
+def some(**changes):
     values = {
         "users": ("ana",),
         "home": np.array([[0.75, 0.25], [0.5, 0.5]]),
@@ -87,36 +88,36 @@ def test_presence_has_a_row_for_each_user_and_room_and_for_away():
 
 
 def test_each_hour_of_the_week_has_its_own():
-    home = np.zeros((168, 2, 2))
-    home[..., 0] = np.linspace(0, 1, 168)[:, None]
-    home[..., 1] = 1 - home[..., 0]
+    first = np.linspace(0, 1, 168)
+    home = np.stack([first, 1 - first], axis=-1)[:, None].repeat(2, axis=1)
     presence = WeeklyPresence(("ana",), (home, np.zeros((168, 2))), NOON)
-    assert presence.share("ana")[0] == home[12, 0, 0]
-    assert presence.at(NOON + timedelta(days=8)).share("ana")[0] == home[36, 0, 0]
+    assert presence.share("ana")[0] == first[12]
+    assert presence.at(NOON + timedelta(days=8)).share("ana")[0] == first[36]
     assert np.array_equal(home[:, 0], presence.by_hour_of_week("ana"))
     assert 0 == slot_of_week(datetime(2026, 1, 5))
     assert 167 == slot_of_week(datetime(2026, 1, 4, 23, 59, 59))
 
 
 @pytest.mark.parametrize("half_life", [None, 2.0])
-def test_sums_by_day_and_hour_equal_a_loop(half_life):
+def test_sums_by_day_and_hour_equal_those_of_polars(half_life):
     random = np.random.default_rng(1)
     day = np.sort(random.choice([100, 101, 103, 109, 110], 300))
-    minute = np.concatenate([np.sort(random.integers(0, 1440, (day == d).sum())) for d in (100, 101, 103, 109, 110)])  # fmt: skip
-    values = random.random((300, 2))
-    counts = DayCounts((2,), half_life)
+    minute = random.integers(0, 1440, 300)
+    minute = minute[np.lexsort((minute, day))]
+    values = random.random(300)
+    counts = DayCounts((1,), half_life)
     for begin in range(0, 300, 17):
         part = slice(begin, begin + 17)
-        counts.add(day[part], minute[part], values[part])
-    weight = 0.5 ** ((110 - day) / half_life) if half_life else np.ones(300)
-    weighted = values * weight[:, None]
-    assert weighted.sum(axis=0).tolist() == pytest.approx(counts.total.tolist())
-    assert [100, 101, 103, 109] == counts.days
-    for at, d in enumerate(counts.days):
-        assert weighted[day == d].sum(axis=0).tolist() == pytest.approx(
-            counts.weighted_days[at].tolist()
-        )
-    hour = (day - 1) % 7 * 24 + minute // 60
-    for slot in range(168):
-        expected = weighted[hour == slot].sum(axis=0)
-        assert expected.tolist() == pytest.approx(counts.by_hour_of_week[slot].tolist())
+        counts.add(day[part], minute[part], values[part, None])
+
+    weight = 0.5 ** ((110 - day) / (half_life or np.inf))
+    rows = pl.DataFrame(
+        {"day": day, "hour": (day - 1) % 7 * 24 + minute // 60, "sum": values * weight}
+    )
+    by_day, by_hour = (rows.group_by(by).agg(pl.sum("sum")).sort(by) for by in ("day", "hour"))
+    assert rows["sum"].sum() == pytest.approx(counts.total[0])
+    assert by_day["day"].to_list()[:-1] == counts.days
+    assert by_day["sum"].to_list()[:-1] == pytest.approx(np.ravel(counts.weighted_days).tolist())
+    week = np.zeros(168)
+    week[by_hour["hour"]] = by_hour["sum"]
+    assert week == pytest.approx(counts.by_hour_of_week[:, 0])

@@ -5,11 +5,10 @@ import pytest
 from tests.algorithms.presence.worlds import DAY, MONDAY, evidence_of, pieces
 from tests.reference import presence as slow
 
-from fleet2d.algorithms.evidence import Evidence
 from fleet2d.algorithms.presence.exposure_ratio import Fremen
 
 
-def rhythmic(days: int, seed: int) -> Evidence:
+def rhythmic(days, seed):
     """A person in room 0 from 8 to 20 h, else in room 1, but for one bin in ten; looks at random."""
     random = np.random.default_rng(seed)
     bins = days * DAY

@@ -1,7 +1,5 @@
 """Told presence: answers correct a belief, fade, and end when the robot sees the person."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.entities.robots.test_interact import PILL, ana, home
@@ -14,7 +12,7 @@ ASK = {**PILL, "do": "ask", "about": "ben", "at": ["07:10"]}
 AWAY = {"type": "schedule", "days": [{"on": "daily", "items": [{"at": "07:01", "away": True}]}]}
 
 
-def beliefs(ben: Any, duration: str = "2 h", **told: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+def beliefs(ben, duration="2 h", **told):
     """The rows about ben of rtp and of the corrected belief."""
     run = fleet2d.run(
         home(
@@ -31,7 +29,7 @@ def beliefs(ben: Any, duration: str = "2 h", **told: Any) -> tuple[dict[str, Any
     return table(run, "rtp", user="ben"), table(run, "told", user="ben")
 
 
-def away_at(rows: dict[str, Any], step: int) -> float:
+def away_at(rows, step):
     """The probability of being away, of the update at a step."""
     (row,) = np.flatnonzero((rows["step"] == step) & (rows["room"] == "away"))
     return float(rows["share"][row])
