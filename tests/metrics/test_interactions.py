@@ -1,10 +1,7 @@
 """What came of interactions: counts, value, interruptions and attitudes, from known answers."""
 
-from typing import Any
-
-import numpy as np
 import pytest
-from tests.entities.robots.test_interact import PILL, Scripted, ana, home
+from tests.entities.robots.test_interact import PILL, ana, home
 from tests.scenes import table
 
 import fleet2d
@@ -12,7 +9,7 @@ import fleet2d
 METRICS = {"interactions": {"period": "1 h"}}
 
 
-def measured(**changes: Any) -> tuple[dict[str, Any], fleet2d.Run]:
+def measured(**changes):
     run = fleet2d.run(home("2 h", metrics=METRICS, **changes))
     return run.metrics["interactions"]["astro"]["ana"], run
 
@@ -65,19 +62,6 @@ def test_bad_times_count_by_activity_and_annoy():
     assert rows["willingness"].max() < 0.1
 
 
-def test_annoyance_and_burden_fade_between_the_prompts_of_a_run():
-    months = {"type": "fading", "annoyed_by": 1, "annoyance_lasts": "30 min"}
-    person = ana() | {"answers": Scripted(outcomes=("accepted",), months=months)}
-    pill = PILL | {"at": [], "every": "1 h", "within": "50 min"}
-    _, run = measured(users={"ana": person}, interactions={"pill": pill})
-    rows = table(run, "interactions")
-    (hours,) = np.diff(rows["asked_at"]) / 3600
-
-    # Each prompt adds 0.5 to annoyance, as she is available with even odds, and 1/7 to the burden.
-    assert [0.5, 0.5 + 0.5 * 0.25**hours] == pytest.approx(rows["annoyance"].tolist())
-    assert [1 / 7, (1 + np.exp(-hours / 168)) / 7] == pytest.approx(rows["burden"].tolist())
-
-
 def test_waking_somebody_is_counted():
     days = [{"on": "daily", "items": [{"at": "07:02", "place": "bedroom", "activity": "sleep"}]}]
     person = ana() | {"days": days, "answers": {"notice": {"base": 20}}}
@@ -94,7 +78,7 @@ def test_algorithms_cannot_read_answers():
     class Curious(Algorithm):
         """Reads the truth."""
 
-        def update(self, history: Any, state: Any) -> Any:
+        def update(self, history, state):
             return {"n": len(history.answers)}
 
     with pytest.raises(ComponentError, match="'answers' is ground truth"):

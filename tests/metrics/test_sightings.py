@@ -1,7 +1,5 @@
 """Precision, recall and confusion, against the stored observations and a count of their own."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.scenes import run, scenario, table
@@ -9,7 +7,7 @@ from tests.scenes import run, scenario, table
 CONFUSION = {"ana": {"ben": 1.0}, "ben": {"ana": 0.5, "cleo": 0.5}}
 
 
-def content(period: str = "10 min") -> dict[str, Any]:
+def content(period="10 min"):
     return scenario(
         "2 h",
         users={name: {"type": "meander"} for name in ("ana", "ben", "cleo")},
@@ -35,7 +33,7 @@ def stored():
     return run(content())
 
 
-def name_of(value: Any, missing: str) -> str:
+def name_of(value, missing):
     return value if isinstance(value, str) else missing
 
 
@@ -57,17 +55,17 @@ def test_recall_and_confusion_are_those_configured(stored):
     """Looks of four hours a user in view, far more than these bounds need."""
     astro, sharp = (stored.metrics["detections"][name] for name in ("astro", "sharp"))
     looks = table(stored, "detections", robot="astro")
-    count = looks["in_view"].sum()
-    assert count > 2000
-    assert abs(astro["recall"] - 0.7) < 4.5 * np.sqrt(0.21 / count)
+    assert looks["detected"].sum() / looks["in_view"].sum() == pytest.approx(astro["recall"])
+    assert astro["recall"] == pytest.approx(0.7, abs=0.05)
     assert astro["confusion"]["ana"]["ben"] == pytest.approx(0.2, abs=0.05)
     assert "cleo" not in astro["confusion"]["ana"]
-    assert astro["confusion"]["ben"]["cleo"] == pytest.approx(0.1, abs=0.04)
-    assert astro["confusion"]["nobody"]["cleo"] == pytest.approx(0.5, abs=0.1)
-    assert {"precision": 1.0, "recall": 1.0, "recognized": 1.0} == {
-        key: sharp[key] for key in ("precision", "recall", "recognized")
-    }
-    assert {"ana": {"ana": 1.0}, "ben": {"ben": 1.0}, "cleo": {"cleo": 1.0}} == sharp["confusion"]
+    exact = {name: {name: 1.0} for name in ("ana", "ben", "cleo")}
+    assert {
+        "precision": 1,
+        "recall": 1,
+        "recognized": 1,
+        "confusion": exact,
+    }.items() <= sharp.items()
 
 
 def test_a_robot_that_sees_nothing_has_no_shares(stored):

@@ -1,15 +1,12 @@
 """Regret of requests: the best time of the same life, which lives under other policies confirm."""
 
 from datetime import timedelta
-from typing import Any
 
 import pytest
 from tests.entities.robots.test_interact import PILL, home
 from tests.scenes import table
 
 import fleet2d
-from fleet2d.algorithms.algorithm import Algorithm
-from fleet2d.errors import ComponentError
 
 # She accepts at rest, whoever asks; a busy person never has time. The request comes up at 07:10.
 SURE = {"base": 50}
@@ -26,9 +23,9 @@ ANSWERS = {
 FALLING = PILL | {"falls_to": 0.5, "tries": 1}
 
 
-def life(*policy: str, **changes: Any) -> fleet2d.Run:
+def life(*policy, **changes):
     person = {"type": "schedule", "days": [{"on": "daily", "items": ITEMS}], "answers": ANSWERS}
-    behaviors: list[dict[str, Any]] = [{"type": "interact"}, {"type": "patrol"}]
+    behaviors = [{"type": "interact"}, {"type": "patrol"}]
     scenario = {
         "users": {"ana": person},
         "robots": {"astro": {"behaviors": behaviors}},
@@ -38,9 +35,8 @@ def life(*policy: str, **changes: Any) -> fleet2d.Run:
     return fleet2d.run(home("2 h", **(scenario | changes)), *policy)
 
 
-def numbers_of(run: fleet2d.Run) -> dict[str, float]:
-    numbers: dict[str, float] = run.metrics["timing_regret"]["astro"]["ana"]
-    return numbers
+def numbers_of(run):
+    return run.metrics["timing_regret"]["astro"]["ana"]
 
 
 def test_who_is_asked_at_a_bad_time_misses_the_best_one():
@@ -104,14 +100,3 @@ def test_times_are_compared_alike_whatever_the_period_and_the_spans():
     )
     for name in ("best_at", "best", "best_chance", "value"):
         assert one[name].tolist() == other[name].tolist() == steps[name].tolist()
-
-
-def test_algorithms_do_not_know_how_people_answer():
-    class Curious(Algorithm):
-        """Reads the truth."""
-
-        def update(self, history: Any, state: Any) -> Any:
-            return {"n": len(history.answer_models)}
-
-    with pytest.raises(ComponentError, match="'answer_models' is ground truth"):
-        life(algorithms={"curious": Curious()})

@@ -136,17 +136,6 @@ def fremen(minutes, weight, state, days, m, at):
     return min(max(p, 0.0), 1.0)
 
 
-def earth_mover(truth, estimate, cost):
-    """The cheapest assignment of units to units, by trying all; weights are whole numbers."""
-    here = [room for room, count in enumerate(estimate) for _ in range(count)]
-    there = [room for room, count in enumerate(truth) for _ in range(count)]
-    assert len(here) == len(there)
-    best = min(
-        sum(cost[i][j] for i, j in zip(here, order, strict=True)) for order in permutations(there)
-    )
-    return best / len(here)
-
-
 def transport(truth, estimate, cost):
     """The least cost of any flow, as a linear program."""
     leaves = np.kron(np.eye(len(truth)), np.ones(len(truth)))
@@ -154,11 +143,6 @@ def transport(truth, estimate, cost):
     ways = np.vstack([leaves, arrives])[:-1]  # the last one follows from the others
     masses = 1e6 * np.concatenate([estimate, truth])[:-1]  # the solver ignores what is below 1e-7
     return linprog(np.ravel(cost), A_eq=ways, b_eq=masses).fun / 1e6
-
-
-def brier(p, truth):
-    """Sum of squares to the true place."""
-    return sum((x - (1 if i == truth else 0)) ** 2 for i, x in enumerate(p))
 
 
 def in_groups(said, masses):
