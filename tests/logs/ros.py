@@ -1,7 +1,5 @@
 """Messages of ROS 1 and ROS 2, and bags of them, that tests share."""
 
-from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ Row = tuple[str, str, int, Any]
 class Ros:
     """Messages of ROS, and bags of them."""
 
-    def __init__(self, version: int) -> None:
+    def __init__(self, version):
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
         self.version = version
@@ -22,15 +20,15 @@ class Ros:
             text = "geometry_msgs/TransformStamped[] transforms"
             self.types.register(get_types_from_msg(text, TF))
 
-    def new(self, name: str, *values: Any) -> Any:
+    def new(self, name, *values):
         return self.types.types[name](*values)
 
-    def header(self, ns: int, frame: str) -> Any:
+    def header(self, ns, frame):
         stamp = self.new("builtin_interfaces/msg/Time", *divmod(ns, 10**9))
         sequence = () if self.version == 2 else (0,)
         return self.new("std_msgs/msg/Header", *sequence, stamp, frame)
 
-    def pose(self, x: float, y: float, heading: float) -> Any:
+    def pose(self, x, y, heading):
         turn = (0.0, 0.0, float(np.sin(heading / 2)), float(np.cos(heading / 2)))
         return self.new(
             "geometry_msgs/msg/Pose",
@@ -38,9 +36,7 @@ class Ros:
             self.new("geometry_msgs/msg/Quaternion", *turn),
         )
 
-    def odometry(
-        self, ns: int, x: float, y: float, heading: float, frame: str = "map", body: str = ""
-    ) -> Any:
+    def odometry(self, ns, x, y, heading, frame="map", body=""):
         still = self.new("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0)
         twist = self.new("geometry_msgs/msg/Twist", still, still)
         return self.new(
@@ -53,7 +49,7 @@ class Ros:
             self.new("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
         )
 
-    def transform(self, ns: int, parent: str, child: str, pose: tuple[float, ...]) -> Any:
+    def transform(self, ns, parent, child, pose):
         x, y, heading = pose
         turn = self.pose(x, y, heading).orientation
         move = self.new(
@@ -62,25 +58,25 @@ class Ros:
         one = self.new("geometry_msgs/msg/TransformStamped", self.header(ns, parent), child, move)
         return self.new("tf2_msgs/msg/TFMessage", [one])
 
-    def grid(self, ns: int, cells: Any, pose: Any, resolution: float = 0.05) -> Any:
+    def grid(self, ns, cells, pose, resolution=0.05):
         """A map of cells (rows, columns), whose lower left corner is at a pose."""
         header = self.header(ns, "map")
         size = (cells.shape[1], cells.shape[0])
         info = self.new("nav_msgs/msg/MapMetaData", header.stamp, resolution, *size, pose)
         return self.new("nav_msgs/msg/OccupancyGrid", header, info, cells.ravel().astype(np.int8))
 
-    def bag(self, path: Path, rows: Iterable[Row], storage: str = "SQLITE3") -> Path:
+    def bag(self, path, rows, storage="SQLITE3"):
         """Write messages: topic, type, time [ns], message."""
         from rosbags.rosbag1 import Writer as Writer1
         from rosbags.rosbag2 import StoragePlugin
         from rosbags.rosbag2 import Writer as Writer2
 
         plugin = StoragePlugin[storage]
-        writer: Any = (
+        writer = (
             Writer2(path, version=9, storage_plugin=plugin) if self.version == 2 else Writer1(path)
         )
         with writer:
-            connections: dict[str, Any] = {}
+            connections = {}
             for topic, kind, ns, message in rows:
                 if topic not in connections:
                     connections[topic] = writer.add_connection(topic, kind, typestore=self.types)
@@ -95,18 +91,18 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 TF = "tf2_msgs/msg/TFMessage"
 
 
-def moved(ros: Ros, child: str, parent: str = "map", x: float = 2.0) -> Row:
+def moved(ros, child, parent="map", x=2.0):
     """Return a transform of `/tf` that moves along x."""
     return "/tf", TF, NINE, ros.transform(NINE, parent, child, (x, 0.0, 0.0))
 
 
 def stamped(
-    ros: Ros,
-    frame: str,
-    turn: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0),
-    x: float = 7.0,
-    after: int = 0,
-) -> Row:
+    ros,
+    frame,
+    turn=(0.0, 0.0, 0.0, 1.0),
+    x=7.0,
+    after=0,
+):
     """Return a pose at (7, 4), some seconds after nine."""
     ns = NINE + after * 10**9
     kind = "geometry_msgs/msg/PoseStamped"

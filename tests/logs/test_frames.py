@@ -8,12 +8,12 @@ from fleet2d.logs.frames import FrameLink, RigidMotions
 spatial = pytest.importorskip("scipy.spatial.transform", reason="SciPy is not installed")
 
 
-def drawn(seed: int, count: int = 50) -> RigidMotions:
+def drawn(seed, count=50):
     numbers = np.random.default_rng(seed).normal(size=(count, 7))
     return RigidMotions.of_rows(numbers.tolist())
 
 
-def matrices(motions: RigidMotions) -> np.ndarray:
+def matrices(motions):
     whole = np.tile(np.eye(4), (len(motions.place), 1, 1))
     whole[:, :3, :3] = spatial.Rotation.from_quat(motions.turn).as_matrix()
     whole[:, :3, 3] = motions.place

@@ -8,7 +8,7 @@ TOILET = Reading(40, 50, "bathroom", "toilet", 2)
 OUT = Reading(120, 150, AWAY, "leaving", 3)
 
 
-def labels(*at: int) -> list[str]:
+def labels(*at):
     """The activities of instants of a sensor."""
     sensors = [Reading(time, time, "bed", "", 1) for time in at]
     readings = label_by_activities(sensors, [SLEEP, TOILET, OUT])

@@ -1,16 +1,10 @@
 """Logs of all layouts: what is read, and what is refused with the line that is wrong."""
 
-from datetime import date
-from pathlib import Path
-
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv as pacsv
-import pyarrow.parquet as pq
 import pytest
 
 from fleet2d.logs.layout import read_log
-from fleet2d.logs.log import ActivityLog, LogError, PositionLog, Reading
+from fleet2d.logs.log import ActivityLog, LogError, PositionLog
 
 S = 1_000_000
 H = 3600 * S
@@ -60,32 +54,22 @@ sleep (22:00 - 1day - 02:00)
 """
 
 
-def write(folder: Path, name: str, text: str) -> Path:
+def write(folder, name, text):
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
 
 
-def activity_log(*arguments: object, **settings: object) -> ActivityLog:
-    log = read_log(*arguments, **settings)  # type: ignore[arg-type]
+def activity_log(*arguments, **settings):
+    log = read_log(*arguments, **settings)
     assert isinstance(log, ActivityLog)
     return log
 
 
-def position_log(*arguments: object, **settings: object) -> PositionLog:
-    log = read_log(*arguments, **settings)  # type: ignore[arg-type]
+def position_log(*arguments, **settings):
+    log = read_log(*arguments, **settings)
     assert isinstance(log, PositionLog)
     return log
-
-
-def test_casas_tells_an_instant_for_each_sensor_that_switches_on(tmp_path):
-    log = activity_log(write(tmp_path, "events.txt", CASAS))
-    assert ("casas", date(2020, 3, 2), 2) == (log.layout, log.first_day, log.days)
-    assert (
-        Reading(7 * H + S // 2, 7 * H + S // 2, "Bedroom", "Sleep", 1),
-        Reading(7 * H + 9 * S, 7 * H + 9 * S, "Kitchen", "Cook", 3),
-        Reading(24 * H + 600 * S, 24 * H + 600 * S, "Kitchen", "Cook", 4),
-    ) == log.readings
 
 
 @pytest.mark.parametrize("named", ["A_Sensors.txt", "A_ADLs.txt", ""])
@@ -99,11 +83,6 @@ def test_uci_adl_joins_both_files_of_a_home_whichever_is_named(tmp_path, named):
         ("Entrance", "Leaving", 9 * H, 9 * H + 5 * S),
         ("away", "Leaving", 9 * H, 10 * H),
     ] == [(r.room, r.activity, r.begin_us, r.end_us) for r in log.readings]
-
-
-def test_uci_adl_of_activities_alone_takes_them_for_rooms(tmp_path):
-    log = activity_log(write(tmp_path, "adl.txt", ADLS))
-    assert ["Sleeping", "Breakfast", "away"] == [r.room for r in log.readings]
 
 
 def test_homer_finds_the_room_of_things_by_their_numbers_and_sleeps_into_the_next_day(tmp_path):
@@ -173,7 +152,7 @@ def test_the_real_logs_are_read_whole(shared_data):
 # Positions
 
 
-def csv(folder: Path, text: str) -> Path:
+def csv(folder, text):
     return write(folder, "rtls.csv", text)
 
 
@@ -187,52 +166,6 @@ def test_positions_of_one_tag_with_headings_in_degrees(tmp_path):
     assert np.pi / 2 == log.heading[0]
     assert np.isnan(log.heading[1])
     assert ("1 fixes of other ids were left out",) == log.notes
-
-
-def as_text(folder: Path) -> tuple[Path, dict[str, str]]:
-    return csv(folder, "t,x,y\n2020-03-02 07:00:00,1,2\n2020-03-02 07:00:00.5,1,3\n"), {}
-
-
-def as_zoned_text(folder: Path) -> tuple[Path, dict[str, str]]:
-    text = "time,x,y\n2020-03-02T06:00:00Z,1,2\n2020-03-02T08:00:00.5+02:00,1,3\n"
-    return csv(folder, text), {"time_zone": "Europe/Berlin"}
-
-
-def as_epoch_ms(folder: Path) -> tuple[Path, dict[str, str]]:
-    return csv(folder, "time,x,y\n1583128800000,1,2\n1583128800500,1,3\n"), {
-        "time_zone": "Europe/Berlin"
-    }
-
-
-def as_parquet(folder: Path) -> tuple[Path, dict[str, str]]:
-    times = pa.array([1583132400 * S, 1583132400 * S + S // 2], pa.timestamp("us"))
-    pq.write_table(
-        pa.table({"time": times, "x": [1.0, 1.0], "y": [2.0, 3.0]}), folder / "a.parquet"
-    )
-    return folder / "a.parquet", {}
-
-
-@pytest.mark.parametrize("write_it", [as_text, as_zoned_text, as_epoch_ms, as_parquet])
-def test_times_of_every_kind_become_the_same_local_times(tmp_path, write_it):
-    path, settings = write_it(tmp_path)
-    log = position_log(path, **settings)
-    assert date(2020, 3, 2) == log.first_day
-    assert [7 * H, 7 * H + S // 2] == log.time_us.tolist()
-
-
-def test_numbers_of_seconds_have_no_date(tmp_path):
-    log = position_log(csv(tmp_path, "time,x,y\n10.5,1,2\n12,1,3\n"))
-    assert (None, [10_500_000, 12_000_000]) == (log.first_day, log.time_us.tolist())
-
-
-def test_summer_time_ends_the_repeated_hour_is_left_out_and_begins_with_an_hour_missing(tmp_path):
-    autumn = [f"2020-10-25T0{h}:30:00Z,1,2" for h in range(4)]  # 02:30, 02:30 again, 03:30, 04:30
-    log = position_log(csv(tmp_path, "time,x,y\n" + "\n".join(autumn)), time_zone="Europe/Berlin")
-    assert [2.5, 3.5, 4.5] == (log.time_us / H).tolist()
-    assert "1 fixes of the hour that the end of summer time repeats" in log.notes[0]
-    spring = [f"2020-03-29T0{h}:30:00Z,1,2" for h in range(2)]
-    log = position_log(csv(tmp_path, "time,x,y\n" + "\n".join(spring)), time_zone="Europe/Berlin")
-    assert [1.5, 3.5] == (log.time_us / H).tolist()
 
 
 def test_drop_outs_and_equal_times_are_left_out_and_counted(tmp_path):
@@ -269,10 +202,3 @@ def test_damaged_positions_are_refused_with_what_to_do(tmp_path, text, settings,
 def test_settings_of_positions_are_refused_for_other_layouts(tmp_path):
     with pytest.raises(LogError, match="takes no time_zone: that is for positions"):
         read_log(write(tmp_path, "a.txt", CASAS), time_zone="UTC")
-
-
-def test_a_csv_written_by_arrow_reads_back(tmp_path):
-    times = pa.array([1583132400 * S, 1583132401 * S], pa.timestamp("us"))
-    pacsv.write_csv(pa.table({"time": times, "x": [1.5, 2.5], "y": [0, 1]}), tmp_path / "a.csv")
-    log = position_log(tmp_path / "a.csv")
-    assert [[1.5, 0], [2.5, 1]] == log.xy.tolist()

@@ -4,10 +4,7 @@ import json
 import random
 import sqlite3
 from bisect import bisect_right
-from collections.abc import Callable
 from datetime import date, datetime, timedelta
-from pathlib import Path
-from typing import Any
 
 import pytest
 from tests.thorough import some
@@ -61,10 +58,10 @@ binary_sensor.kitchen,unavailable,2026-03-02 10:00:00
 """
 
 
-def lives(seed: int, days: int = 2) -> list[Stay]:
+def lives(seed, days=2):
     """Return the truth: stays in rooms and out of the home, one after the other."""
     draw = random.Random(seed)
-    stays: list[Stay] = []
+    stays = []
     at = draw.randrange(600)
     room = ""
     while at < days * 86_400:
@@ -79,11 +76,11 @@ def lives(seed: int, days: int = 2) -> list[Stay]:
     return stays
 
 
-def stamp(second: int, text: str = "%Y-%m-%d %H:%M:%S") -> str:
+def stamp(second, text="%Y-%m-%d %H:%M:%S"):
     return (DAY + timedelta(seconds=second)).strftime(text)
 
 
-def casas(stays: list[Stay], path: Path) -> Path:
+def casas(stays, path):
     lines = []
     for begin, end, room, doing in stays:
         if room == AWAY:
@@ -97,7 +94,7 @@ def casas(stays: list[Stay], path: Path) -> Path:
     return written(path / "data", lines)
 
 
-def kasteren(stays: list[Stay], path: Path) -> Path:
+def kasteren(stays, path):
     text = "%d-%b-%Y %H:%M:%S"
     names = {room: k for k, room in enumerate(ROOMS, 5)}
     doings = {doing: k for k, doing in enumerate([*DOINGS.values(), "leave-house"], 14)}
@@ -113,7 +110,7 @@ def kasteren(stays: list[Stay], path: Path) -> Path:
     return written(path / "kast_houseB-ss.txt", sensors)
 
 
-def mit(stays: list[Stay], path: Path) -> Path:
+def mit(stays, path):
     rows = []
     for begin, end, room, doing in stays:
         times = [stamp(second, "%H:%M:%S") for second in range(begin, min(end, begin + 600), 60)]
@@ -132,7 +129,7 @@ def mit(stays: list[Stay], path: Path) -> Path:
 CODES = {"Cook": 3, "Sleep": 11, "Wash": 14, "Read": 18, "Leave_Home": 2}
 
 
-def aras(stays: list[Stay], path: Path) -> Path:
+def aras(stays, path):
     codes = [1] * (2 * 86_400)
     for begin, end, _, doing in stays:
         codes[begin:end] = [CODES[doing]] * (end - begin)
@@ -142,7 +139,7 @@ def aras(stays: list[Stay], path: Path) -> Path:
     return path
 
 
-def openshs(stays: list[Stay], path: Path) -> Path:
+def openshs(stays, path):
     head = [*(f"{room}Carp" for room in ROOMS), "mainDoor", "Activity", "timestamp"]
     rows = []
     for begin, end, room, doing in stays:
@@ -152,7 +149,7 @@ def openshs(stays: list[Stay], path: Path) -> Path:
     return written(path / "d1.csv", [",".join(head), *rows])
 
 
-def table_of_states(stays: list[Stay], path: Path) -> Path:
+def table_of_states(stays, path):
     rows = ["entity_id;state;last_changed"]
     for begin, end, room, _ in stays:
         if room == AWAY:
@@ -165,54 +162,51 @@ def table_of_states(stays: list[Stay], path: Path) -> Path:
     return written(path / "history.csv", rows)
 
 
-def database(stays: list[Stay], path: Path, *, is_old: bool = False) -> Path:
+def database(stays, path, *, is_old=False):
+    """Write the database of Home Assistant; old ones name the entity in each row."""
     file = path / "home-assistant_v2.db"
-    table = path / "t"
-    table.mkdir()
-    rows = [line.split(";") for line in table_of_states(stays, table).read_text().splitlines()[1:]]
+    lines = table_of_states(stays, path).read_text().splitlines()[1:]
+    rows = [line.split(";") for line in lines]
     with sqlite3.connect(file) as db:
         if is_old:
             db.execute(
-                "CREATE TABLE states (state_id INTEGER PRIMARY KEY, entity_id TEXT, state TEXT,"
-                " last_changed TEXT, last_updated TEXT)"
+                "CREATE TABLE states (state_id INTEGER PRIMARY KEY, entity_id, state, last_changed, last_updated)"
             )
-            rows = [[entity, state, None, f"{time}.000000"] for entity, state, time in rows]
+            db.executemany("INSERT INTO states VALUES (NULL, ?, ?, NULL, ? || '.000000')", rows)
+        else:
+            db.execute(
+                "CREATE TABLE states_meta (metadata_id INTEGER PRIMARY KEY, entity_id UNIQUE)"
+            )
+            db.execute(
+                "CREATE TABLE states (state_id INTEGER PRIMARY KEY, metadata_id, state, last_changed_ts, last_updated_ts)"
+            )
             db.executemany(
-                "INSERT INTO states(entity_id, state, last_changed, last_updated) VALUES (?,?,?,?)",
+                "INSERT OR IGNORE INTO states_meta VALUES (NULL, ?)", [row[:1] for row in rows]
+            )
+            db.executemany(
+                "INSERT INTO states SELECT NULL, metadata_id, ?2, NULL, unixepoch(?3)"
+                " FROM states_meta WHERE entity_id = ?1",
                 rows,
             )
-        else:
-            db.execute("CREATE TABLE states_meta (metadata_id INTEGER PRIMARY KEY, entity_id TEXT)")
-            db.execute(
-                "CREATE TABLE states (state_id INTEGER PRIMARY KEY, metadata_id INTEGER, state TEXT,"
-                " last_changed_ts FLOAT, last_updated_ts FLOAT)"
-            )
-            entities = sorted({row[0] for row in rows})
-            db.executemany("INSERT INTO states_meta VALUES (?,?)", list(enumerate(entities, 1)))
-            for entity, state, time in rows:
-                seconds = (datetime.fromisoformat(time) - datetime(1970, 1, 1)).total_seconds()
-                db.execute(
-                    "INSERT INTO states(metadata_id, state, last_updated_ts) VALUES (?,?,?)",
-                    (entities.index(entity) + 1, state, seconds),
-                )
     db.close()
+    (path / "history.csv").unlink()
     return file
 
 
-def old_database(stays: list[Stay], path: Path) -> Path:
+def old_database(stays, path):
     return database(stays, path, is_old=True)
 
 
-def as_history(stays: list[Stay], path: Path) -> dict[str, list[tuple[str, datetime]]]:
+def as_history(stays, path):
     """Return the states of each entity with their times, in UTC."""
     rows = [row.split(";") for row in table_of_states(stays, path).read_text().splitlines()[1:]]
-    states: dict[str, list[tuple[str, datetime]]] = {}
+    states = {}
     for entity, state, time in rows:
         states.setdefault(entity, []).append((state, datetime.fromisoformat(f"{time}+00:00")))
     return states
 
 
-def rest_history(stays: list[Stay], path: Path) -> Path:
+def rest_history(stays, path):
     """Write what the REST API answers: of the states between, entity and attributes are left out."""
     content = []
     for entity, states in as_history(stays, path).items():
@@ -223,9 +217,9 @@ def rest_history(stays: list[Stay], path: Path) -> Path:
     return written(path / "history.json", [json.dumps(content)])
 
 
-def socket_history(stays: list[Stay], path: Path) -> Path:
+def socket_history(stays, path):
     """Write the message of the WebSocket API; states were updated later than they changed."""
-    content: dict[str, Any] = {}
+    content = {}
     for entity, states in as_history(stays, path).items():
         content[entity] = [
             {"s": state, "a": {}, "lu": time.timestamp() + 1, "lc": time.timestamp()}
@@ -236,13 +230,12 @@ def socket_history(stays: list[Stay], path: Path) -> Path:
     return written(path / "history.txt", [json.dumps(message, indent=2)])
 
 
-def written(path: Path, lines: list[str]) -> Path:
+def written(path, lines):
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 
-Writer = Callable[[list[Stay], Path], Path]
-LAYOUTS: dict[str, tuple[Writer, dict[str, Any]]] = {
+LAYOUTS = {
     "casas": (casas, {}),
     "kasteren": (kasteren, {}),
     "mit": (mit, {}),
@@ -260,12 +253,12 @@ OF_ACTIVITY = {doing: room for room, doing in DOINGS.items()} | {
 }
 
 
-def room_of(label: str) -> str:
+def room_of(label):
     named = (room for room in ROOMS if room in label)
     return OF_ACTIVITY.get(label) or next(named, label)
 
 
-def at(log: ActivityLog, second: int) -> tuple[str, str]:
+def at(log, second):
     """Return the room and activity that a log shows last up to a moment."""
     last = log.readings[bisect_right(log.readings, second * S, key=lambda r: r.begin_us) - 1]
     return room_of(last.room), last.activity
@@ -278,18 +271,15 @@ def test_rooms_stays_and_activities_equal_the_truth(name, seed, tmp_path):
     stays = lives(seed)
     log = read_log(write(stays, tmp_path), **keys)
 
-    assert isinstance(log, ActivityLog)
-    is_of_states = name == "states" or " " in name or name == "database"
-    assert log.layout == ("states" if is_of_states else name)
+    layout = name if name in ("casas", "kasteren", "mit", "aras", "openshs") else "states"
+    assert log.layout == layout
     assert log.first_day in (None, date(2026, 3, 2))
-    has_absence = name != "casas"
     for begin, end, room, doing in stays:
-        middle = begin + min(30, (end - begin) // 2)
-        if room == AWAY and not has_absence:
+        if room == AWAY and name == "casas":  # it knows of no absence
             continue
-        found, activity = at(log, middle)
+        found, activity = at(log, begin + min(30, (end - begin) // 2))
         assert found == room, (begin, end)
-        if not is_of_states and room != AWAY and name != "aras":
+        if log.layout not in ("states", "aras") and room != AWAY:
             assert activity == doing
 
 
@@ -320,15 +310,14 @@ def test_layouts_are_recognized_by_content_and_folders_by_their_files(tmp_path):
 
 def test_an_end_before_its_beginning_is_told_of_sensors_and_activities(tmp_path):
     """It was taken for an instant without a note."""
-    begin, end = "02-Mar-2026 08:00:00", "02-Mar-2026 07:00:00"
     for kind in ("ss", "as"):
-        written(tmp_path / f"kast_houseB-{kind}.txt", [f"{begin}\t{end}\t1"])
+        row = "02-Mar-2026 08:00:00\t02-Mar-2026 07:00:00\t1"
+        written(tmp_path / f"kast_houseB-{kind}.txt", [row])
 
     log = read_log(tmp_path, "kasteren")
 
     ignored = "an end before the beginning is ignored, in line 1"
     assert log.notes == tuple(f"kast_houseB-{kind}.txt: {ignored}" for kind in ("ss", "as"))
-    assert isinstance(log, ActivityLog)
     assert {(r.begin_us, r.end_us) for r in log.readings} == {(8 * 3600 * S, 8 * 3600 * S)}
 
 
@@ -441,7 +430,7 @@ def test_a_database_of_something_else_is_refused(tmp_path):
     [
         ("binary_sensor.kitchen_motion", "kitchen"),
         ("Hall-Bedroom door", "bedroom"),
-        ("Front door", "door"),
+        ("door", "door"),
         ("Groceries Cupboard", "kitchen"),
         ("livingCarp", "living_room"),
         ("sensor.office_3_presence", "office"),
@@ -449,24 +438,11 @@ def test_a_database_of_something_else_is_refused(tmp_path):
     ],
 )
 def test_labels_are_taken_for_the_rooms_that_their_words_name(label, room):
-    rooms = fleet2d.load_floorplan().rooms
-    (choice,) = map_rooms({label: 1}, {}, rooms)[label] or ("none",)
+    (choice,) = map_rooms({label: 1}, {}, fleet2d.load_floorplan().rooms)[label]
     assert choice.startswith(room)
 
 
-@pytest.mark.parametrize("label", ["M003", "door", "sensor.x"])
+@pytest.mark.parametrize("label", ["M003", "sensor.x"])
 def test_labels_without_such_words_are_asked_for(label):
-    rooms = fleet2d.load_floorplan().rooms
-    if label == "door":
-        assert map_rooms({label: 1}, {}, rooms)[label] == ("door",)
-        return
     with pytest.raises(LogError, match="no room of this home stands for"):
-        map_rooms({label: 1}, {}, rooms)
-
-
-@pytest.mark.parametrize(("home", "days", "absences"), [("A", 28, 33), ("C", 20, 47)])
-def test_real_homes_of_kasteren_are_read_whole(shared_data, home, days, absences):
-    log = read_log(shared_data / "activity" / "kasteren" / f"kast_house{home}-ss.txt")
-    assert isinstance(log, ActivityLog)
-    assert (log.days, log.rooms[AWAY]) == (days, absences)
-    assert {"sleeping", "take-shower", "prep-dinner"} <= {r.activity for r in log.readings}
+        map_rooms({label: 1}, {}, fleet2d.load_floorplan().rooms)

@@ -1,7 +1,6 @@
 """Frames of logs: any similarity is undone, exactly told or fitted to matches."""
 
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from fleet2d.logs.placement import LogFrame, map_rooms
 NUMBER = st.floats(-50, 50)
 
 
-def named_room(kind: str, *functions: str) -> Any:
+def named_room(kind, *functions):
     """Return what is used of a room: its name, its type, and what it may be called by."""
     name = f"{kind}_1"
     return SimpleNamespace(name=name, type=kind, words=(name, kind, *functions))

@@ -4,11 +4,10 @@ import json
 import random
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+import polars as pl
 import pytest
 
 import fleet2d
@@ -30,6 +29,12 @@ NAMES = {
 BERLIN = timedelta(hours=2)  # in April
 
 
+FORMS = [
+    "%Y-%m-%d %H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%f", "%Y-%m-%d %H:%M:%S.%f+02:00",
+    "%d.%m.%Y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S.%f", "%m/%d/%Y %I:%M:%S.%f %p", "%H:%M:%S.%f",
+]  # fmt: skip
+
+
 class Variant(NamedTuple):
     """A file, the keys with which it is read, and what it says."""
 
@@ -39,112 +44,97 @@ class Variant(NamedTuple):
     plan: np.ndarray
 
 
-def spelled_times(draw: random.Random, times: list[datetime]) -> tuple[list[Any], str, bool]:
+def spelled_times(draw, times):
     """Return times in a spelling, the end of their column's name, and whether they have a zone."""
     utc = [(time - BERLIN).replace(tzinfo=UTC) for time in times]
-    epoch_us = [round(time.timestamp() * 1e6) for time in utc]
-    kind = draw.choice(["iso", "T", "Z", "offset", "s", "ms", "us", "ns", "dots", "slash", "us12", "utc", "rounded", "clock"])  # fmt: skip
-    if kind in ("s", "ms", "us", "ns"):
-        unit = {"s": 1e6, "ms": 1e3, "us": 1, "ns": 1e-3}[kind]
-        values = [round(us / unit, 6) if kind == "s" else round(us / unit) for us in epoch_us]
-        return values, draw.choice(["", f"_{kind}", f" [{kind}]"]), True
+    kind = draw.choice(["local", "local", "local", "epoch", "epoch", "rounded", "Z", "utc"])
+    if kind == "local":
+        form = draw.choice(FORMS)
+        return [time.strftime(form) for time in times], "", form.endswith("+02:00")
+    if kind == "epoch":
+        unit, digits = draw.choice([("s", 0), ("ms", 3), ("us", 6), ("ns", 9)])
+        seconds = [time.timestamp() for time in utc]
+        values = [round(s, 6) if unit == "s" else round(s * 10**digits) for s in seconds]
+        return values, draw.choice(["", f"_{unit}", f" [{unit}]"]), True
     if kind == "rounded":
-        return [f"{us / 1e6:.5E}" for us in epoch_us], "", True
-    if kind == "utc":
-        return [f"{t:%Y-%m-%d %H:%M:%S.%f}" for t in utc], " (UTC)", True
-    form = {
-        "iso": "%Y-%m-%d %H:%M:%S.%f", "T": "%Y-%m-%dT%H:%M:%S.%f",
-        "Z": "%Y-%m-%dT%H:%M:%S.%fZ", "offset": "%Y-%m-%d %H:%M:%S.%f+02:00",
-        "dots": "%d.%m.%Y %H:%M:%S.%f", "slash": "%d/%m/%Y %H:%M:%S.%f",
-        "us12": "%m/%d/%Y %I:%M:%S.%f %p", "clock": "%H:%M:%S.%f",
-    }[kind]  # fmt: skip
-    said = utc if kind == "Z" else times
-    return [t.strftime(form) for t in said], "", kind in ("Z", "offset")
+        return [f"{time.timestamp():.5E}" for time in utc], "", True
+    form, end = {"Z": ("%Y-%m-%dT%H:%M:%S.%fZ", ""), "utc": (FORMS[0], " (UTC)")}[kind]
+    return [time.strftime(form) for time in utc], end, True
 
 
-def variant(draw: random.Random, folder: Path) -> Variant:
+def variant(draw, folder):
     """Write a log of two tags in a random spelling."""
     start = datetime(2026, 4, draw.randint(1, 28), 8)
     times = [start + timedelta(seconds=s) for s in (0.0, 1.5, 3.0, 10.25)]
     plan = np.array([[draw.uniform(1, 12), draw.uniform(1, 9)] for _ in times])
-    unit, rotation = draw.choice(list(METRES)), draw.choice([0, 90, 180, 270, 33.0])
-    flip, origin = draw.random() < 0.5, (draw.uniform(-5, 5), draw.uniform(-5, 5))
-    turn = np.deg2rad(rotation)
-    back = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-    log = (back @ (plan - origin).T).T / METRES[unit] * (1, -1 if flip else 1)
+    unit = draw.choice(list(METRES))
+    frame = {
+        "rotation_deg": draw.choice([0, 90, 180, 270, 33.0]),
+        "flip_y": draw.random() < 0.5,
+        "origin": [draw.uniform(-5, 5), draw.uniform(-5, 5)],
+    }
+    z = (plan - frame["origin"]) @ [1, 1j] * np.exp(-1j * np.deg2rad(frame["rotation_deg"]))
+    x, y = z.real / METRES[unit], z.imag / METRES[unit] * (-1 if frame["flip_y"] else 1)
     tag, other = draw.choice(IDS)
     named_unit = draw.choice(["", f" [{unit}]", f" ({unit})", f"_{unit}"])
     values, end, has_zone = spelled_times(draw, times)
     digits = draw.choice([3, 6])
-    cells: dict[str, list[Any]] = {"time": [], "id": [], "x": [], "y": []}
-    for row, (x, y) in enumerate(log.tolist()):
-        for who, off in ((tag, 0.0), (other, 7.0)):
-            for name, value in zip(cells, (values[row], who, round(x + off, digits), round(y - off, digits)), strict=True):  # fmt: skip
-                cells[name].append(value)
-    order = draw.sample(list(cells), 4)
+    rows = pl.DataFrame({"time": values, "id": tag, "x": x, "y": y}, strict=False)
+    both = pl.concat([rows, rows.with_columns(pl.lit(other).alias("id"), pl.col("x") + 7)])
+    both = both.with_row_index("n").sort(pl.col("n") % len(times), "n").drop("n")
     heads = {
         name: draw.choice(NAMES[name]) + {"time": end, "id": ""}.get(name, named_unit)
-        for name in order
+        for name in draw.sample(list(NAMES), 4)
     }
-    path, decimal = write(draw, folder, {heads[n]: cells[n] for n in order}, heads["id"])
-    keys = {"type": "replay", "path": path.name, "day": "date"}
-    frame: dict[str, Any] = {"rotation_deg": rotation, "flip_y": flip, "origin": list(origin)}
+    table = both.with_columns(pl.col("x", "y").round(digits)).select(*heads).rename(heads)
+    path, decimal = write(draw, folder, table)
+    keys = {"type": "replay", "path": path.name, "day": "date", "frame": frame}
     if not named_unit or draw.random() < 0.1:
         frame["scale"] = METRES[unit]
-    keys["frame"] = frame
     if has_zone and draw.random() < 0.95:
         keys["time_zone"] = "Europe/Berlin"
     if decimal and draw.random() < 0.5:
         keys["decimal_comma"] = decimal == ","
     if draw.random() < 0.5 and "/" in str(values[0]):
         keys["day_first"] = "M" not in str(values[0])
-    text = json.dumps(keys)[:-1]
     quote = draw.choice(['"', '"', "'", ""])
-    text += "}" if draw.random() < 0.05 else f", id: {quote}{tag}{quote}}}"
-    return Variant(path, text, times, plan)
+    name = "" if draw.random() < 0.05 else f", id: {quote}{tag}{quote}"
+    return Variant(path, json.dumps(keys)[:-1] + name + "}", times, plan)
 
 
-def write(
-    draw: random.Random, folder: Path, columns: dict[str, list[Any]], id_name: str
-) -> tuple[Path, str]:
+def write(draw, folder, table):
     """Write a table in a random format; return it and the decimal mark, if it is of CSV."""
     form = draw.choice(["csv", "csv", "csv", "csv", "tsv", "parquet", "jsonl"])
     path = folder / f"log.{form}"
     if form == "parquet":
-        ids = columns[id_name]
-        if all(text == str(int(text)) for text in ids if text.isdigit()) and "".join(ids).isdigit():
-            columns = {**columns, id_name: [int(text) for text in ids]}
-        pq.write_table(pa.table(columns), path)
-        return path, ""
-    if form == "jsonl":
-        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+        table.write_parquet(path)
+    elif form == "jsonl":
+        table.write_ndjson(path)
+    if form in ("parquet", "jsonl"):
         return path, ""
     decimal = draw.choice([".", ",", ","])
     delimiter = "\t" if form == "tsv" else draw.choice([",", ";", ";", "\t"])
     quoted, thousands = draw.random() < 0.8, draw.random() < 0.1
 
-    def cell(value: Any) -> str:
+    def cell(value):
         text = str(value)
         if isinstance(value, int | float):
             text = f"{value:,}" if thousands else repr(value)
             text = text.translate(str.maketrans(".,", ",.")) if decimal == "," else text
         return f'"{text}"' if quoted and delimiter in text else text
 
-    lines = [[cell(name) for name in columns]]
-    lines += [[cell(value) for value in row] for row in zip(*columns.values(), strict=True)]
+    lines = [delimiter.join(map(cell, row)) for row in [table.columns, *table.iter_rows()]]
     if draw.random() < 0.3:
-        lines = [[*row, '"seen\nby a"' if number else "note"] for number, row in enumerate(lines)]
-    text = "\n".join(delimiter.join(row) for row in lines) + "\n"
+        note = f'{delimiter}"seen\nby a"'
+        lines = [f"{lines[0]}{delimiter}note", *(line + note for line in lines[1:])]
     if draw.random() < 0.2:
-        text = f"sep={delimiter}\n{text}"
-    if draw.random() < 0.5:
-        text = text.replace("\n", "\r\n")
+        lines.insert(0, f"sep={delimiter}")
+    text = draw.choice(["\n", "\r\n"]).join([*lines, ""])
     path.write_bytes(text.encode(draw.choice(["utf-8", "utf-8-sig", "utf-16", "cp1252"])))
     return path, decimal
 
 
-def verdict(variant: Variant) -> str:
+def verdict(variant):
     """Return whether a variant is read as it is meant, wrong, or refused and why."""
     scenario = variant.path.with_name("home.yaml")
     scenario.write_text(
@@ -153,7 +143,7 @@ def verdict(variant: Variant) -> str:
     )
     try:
         loaded = fleet2d.load_scenario(scenario)
-        replay: Any = loaded.users["ana"].behaviors[0]
+        replay = loaded.users["ana"].behaviors[0]
         log = read_log(
             replay.path, replay.format, id=replay.id, **replay.reading(loaded.simulation.clock)
         )

@@ -2,8 +2,6 @@
 
 import json
 from datetime import datetime, timedelta
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -26,19 +24,19 @@ TAGS = """time,id,x,y
 """
 
 
-def positions(path: Path, **settings: Any) -> PositionLog:
+def positions(path, **settings):
     log = read_log(path, **settings)
     assert isinstance(log, PositionLog)
     return log
 
 
-def csv(folder: Path, text: str, encoding: str = "utf-8", name: str = "log.csv") -> Path:
+def csv(folder, text, encoding="utf-8", name="log.csv"):
     path = folder / name
     path.write_bytes(text.encode(encoding))
     return path
 
 
-def moments(log: PositionLog) -> list[datetime]:
+def moments(log):
     assert log.first_day is not None
     midnight = datetime.combine(log.first_day, datetime.min.time())
     return [midnight + timedelta(microseconds=us) for us in log.time_us.tolist()]
@@ -70,7 +68,7 @@ def test_hexadecimal_tags_are_named_as_in_the_file(tmp_path):
     ("ids", "tag"), [([7, 7, 8], "7"), (["007", "007", "7"], "007"), ([True, True, False], "true")]
 )
 def test_ids_of_typed_tables_are_their_text(tmp_path, ids, tag):
-    columns: dict[str, list[Any]] = {"time": [1, 2, 3], "id": ids, "x": [1.0, 2.0, 3.0]}
+    columns = {"time": [1, 2, 3], "id": ids, "x": [1.0, 2.0, 3.0]}
     columns["y"] = columns["x"]
     parquet, lines = tmp_path / "a.parquet", tmp_path / "a.jsonl"
     pq.write_table(pa.table(columns), parquet)
