@@ -1,21 +1,16 @@
 """What every planned day must keep, checked straight from the template and not by the planner."""
 
-from collections.abc import Sequence
 from datetime import date
 from itertools import pairwise
 
 from fleet2d.routines.interruptions import without_interruptions
-from fleet2d.routines.persona import DayTemplate, Persona
-from fleet2d.routines.planner import Episode
 from fleet2d.routines.templates import REACH
 
 DAY_S = 86_400
 MONDAY = date(2026, 1, 5).toordinal()
 
 
-def violations(
-    persona: Persona, ordinal: int, day: Sequence[Episode], next_day: Sequence[Episode]
-) -> list[str]:
+def violations(persona, ordinal, day, next_day):
     """Say in words what a day breaks, needs and errands left out."""
     day = without_interruptions(day)
     template = persona.days[persona.day(date.fromordinal(ordinal))]
@@ -32,7 +27,7 @@ def violations(
     return faults + _broken_tasks(persona, template, day)
 
 
-def _broken_tasks(persona: Persona, template: DayTemplate, day: Sequence[Episode]) -> list[str]:
+def _broken_tasks(persona, template, day):
     faults = []
     at = {episode.task: episode for episode in day if episode.task}
     if len(at) != sum(1 for episode in day if episode.task):
@@ -60,7 +55,7 @@ def _broken_tasks(persona: Persona, template: DayTemplate, day: Sequence[Episode
     return faults
 
 
-def _outside(name: str, timing: object, begin: int) -> list[str]:
+def _outside(name, timing, begin):
     at, between = timing.at, timing.between
     if between is not None:
         first, last = (t.total_seconds() for t in between)

@@ -1,21 +1,17 @@
 """Personas that extend others, what interrupts their stays, and how long they are out."""
 
-from datetime import timedelta
-from typing import Any
-
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from tests.routines.days import MONDAY
 
 from fleet2d.routines.activity import find_activity
-from fleet2d.routines.interruptions import usual_needs
 from fleet2d.routines.life import Life
-from fleet2d.routines.persona import AnyPersona, Persona, bundled_names, bundled_persona
+from fleet2d.routines.persona import AnyPersona, bundled_persona
 
 HOUR = 3600
 
 
-def read(value: Any) -> Persona:
+def read(value):
     return TypeAdapter(AnyPersona).validate_python(value)
 
 
@@ -24,12 +20,6 @@ def test_of_several_personas_each_changes_those_before_it(tmp_path):
     extended = read({"extends": ["student", str(tmp_path / "slow.yaml")], "about": "mine"})
     assert (0.5, "mine") == (extended.pace, extended.about)
     assert bundled_persona("student").days == extended.days
-
-
-@pytest.mark.parametrize("name", bundled_names())
-def test_everybody_gets_up_within_stays(name):
-    assert {"pick_up", "freshen_up"} < set(bundled_persona(name).needs)
-    assert {"pick_up", "freshen_up"} < set(usual_needs())
 
 
 @pytest.mark.parametrize(("needs", "fetches"), [("", False), ("needs: {pick_up: null}\n", True)])
@@ -70,16 +60,3 @@ def test_the_retired_are_out_for_2_to_4_h_a_day(name, often):
             was_out = is_out
     assert often == pytest.approx(outings / days, abs=0.25)
     assert 2 < out_s / HOUR / days < 4
-
-
-def test_short_stays_interrupt_a_stay_for_less_than_minutes():
-    lived = Life(bundled_persona("works_from_home"), 4, "users.ana")
-    took = [
-        episode.end - episode.begin
-        for ordinal in range(MONDAY, MONDAY + 28)
-        for episode in lived.day(ordinal)
-        if episode.activity == "pick_up"
-    ]
-    assert 20 * 28 < len(took) < 40 * 28
-    assert timedelta(minutes=4).total_seconds() >= max(took)
-    assert sorted(took)[len(took) // 2] < 60
