@@ -1,7 +1,6 @@
 """Robustness beside rtamt, the library for signal temporal logic, on random signals."""
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,47 +14,33 @@ from fleet2d.expectations import (
     at_end,
     eventually,
     holds_for,
-    implies,
     metric,
     once,
     since,
     until,
 )  # fmt: skip
-from fleet2d.expectations.expectation import Expectation
 
 rtamt = pytest.importorskip("rtamt", reason="pip install rtamt: it is only compared with")
 
 STEPS = 24
 X, Y = metric("x"), metric("y")
 # The formula of rtamt, the same here, and how many steps it looks ahead.
-FORMULAS: list[tuple[str, Expectation, int]] = [
+FORMULAS = [
     ("x >= 0.5", X >= 0.5, 0),
-    ("not(x >= 0.5)", ~(X >= 0.5), 0),
-    ("(x >= 0.5) and (y <= 1)", (X >= 0.5) & (Y <= 1), 0),
     ("(x >= 0.5) or (y <= 1)", (X >= 0.5) | (Y <= 1), 0),
-    ("(x >= 0.5) implies (y <= 1)", implies(X >= 0.5, Y <= 1), 0),
     ("x >= y", X >= Y, 0),
-    ("x + y >= 1", X + Y >= 1, 0),
     ("x - y <= 1", X - Y <= 1, 0),
-    ("always[0:5](x >= 0.5)", always(X >= 0.5, within="5 s"), 5),
-    ("eventually[0:5](x >= 0.5)", eventually(X >= 0.5, within="5 s"), 5),
     ("always[2:6](x >= 0.5)", always(X >= 0.5, within="2..6 s"), 6),
     ("eventually[2:6](x >= 0.5)", eventually(X >= 0.5, within="2..6 s"), 6),
-    ("(x >= 0.5) until[0:4] (y >= 1)", until(X >= 0.5, Y >= 1, within="4 s"), 4),
     ("(x >= 0.5) until[2:5] (y >= 1)", until(X >= 0.5, Y >= 1, within="2..5 s"), 5),
-    ("once(x >= 0.5)", once(X >= 0.5), 0),
-    ("once[0:3](x >= 0.5)", once(X >= 0.5, within="3 s"), 0),
     ("once[2:5](x >= 0.5)", once(X >= 0.5, within="2..5 s"), 0),
     ("(x >= 0.5) since (y >= 1)", since(X >= 0.5, Y >= 1), 0),
-    ("(x >= 0.5) since[0:4] (y >= 1)", since(X >= 0.5, Y >= 1, within="4 s"), 0),
     ("(x >= 0.5) since[1:4] (y >= 1)", since(X >= 0.5, Y >= 1, within="1..4 s"), 0),
     (
         "always[0:3](eventually[0:2](x >= 0.5))",
         always(eventually(X >= 0.5, within="2 s"), within="3 s"),
         5,
     ),
-    ("always(x >= 0.5)", always(X >= 0.5), 0),
-    ("eventually(x >= 0.5)", eventually(X >= 0.5), 0),
 ]
 signals = st.lists(
     st.floats(-3, 3, allow_nan=False).map(lambda value: round(value, 2)),
@@ -64,7 +49,7 @@ signals = st.lists(
 
 
 @cache
-def specification_of(formula: str) -> Any:
+def specification_of(formula):
     specification = rtamt.StlDiscreteTimeSpecification()
     for name in ("x", "y", "out"):
         specification.declare_var(name, "float")
@@ -73,7 +58,7 @@ def specification_of(formula: str) -> Any:
     return specification
 
 
-def theirs(formula: str, x: list[float], y: list[float]) -> Any:
+def theirs(formula, x, y):
     content = {"time": list(range(STEPS)), "x": x, "y": y}
     return np.array([value for _, value in specification_of(formula).evaluate(content)])
 

@@ -1,18 +1,13 @@
 """Distances between storeys: what lies side by side in the plan isn't near."""
 
 import json
-from pathlib import Path
-from typing import Any
 
-import pytest
 from tests.two_storeys import PLAN
 
 import fleet2d
 
 
-def verdicts(
-    tmp_path: Path, *, stairs: bool = True, house: Any = PLAN, **expected: str
-) -> dict[str, list[tuple[int, int]]]:
+def verdicts(tmp_path, *, stairs=True, house=PLAN, **expected):
     """Return when what is expected of a minute is violated.
 
     Ana stands above, and from second 30 on below; luna above, astro below.
@@ -34,7 +29,7 @@ def verdicts(
             "expect": expected,
         }
     )
-    found: dict[str, list[tuple[int, int]]] = {name: [] for name in expected}
+    found = {name: [] for name in expected}
     for row in run.tables["violations"].to_pylist():
         found[row["expectation"]].append((row["step"], row["last_step"]))
     return found
@@ -61,42 +56,6 @@ def test_a_place_of_the_same_storey_is_as_far_as_ever(tmp_path):
     )
 
     assert found == {"room": [], "point": [], "kinds": []}
-
-
-def test_the_nearest_is_on_the_same_storey(tmp_path):
-    found = verdicts(
-        tmp_path,
-        above="always(implies(room(ana) == above, nearest(ana) == luna))",
-        below="always(implies(room(ana) == below, nearest(ana) == astro))",
-    )
-
-    assert found == {"above": [], "below": []}
-
-
-def test_without_portals_the_plan_is_one_storey(tmp_path):
-    found = verdicts(tmp_path, stairs=False, body="never(distance(astro, ana) < 3 m)")
-
-    assert found == {"body": [(0, 59)]}
-
-
-@pytest.mark.parametrize("max_span", [1, 7])
-def test_spans_change_no_distance(tmp_path, max_span):
-    expected = {"near": "always(distance(astro, ana) < 1.5 m)"}
-    path = tmp_path / "house.json"
-    path.write_text(json.dumps(PLAN))
-    content = {
-        "extends": "bundled:paper",
-        "simulation": {"duration": "20 min", "start": "2026-01-05T08:00"},
-        "floorplan": {"type": "native", "path": str(path)},
-        "users": {"ana": {"type": "meander"}},
-        "robots": {"astro": {"behaviors": [], "keep_out": []}},
-        "expect": expected,
-    }
-    whole = fleet2d.run(content)
-    short = fleet2d.run(content, f"simulation.max_span={max_span}")
-
-    assert whole.digest == short.digest
-    assert whole.tables["violations"].equals(short.tables["violations"])
 
 
 def test_a_garage_that_nothing_joins_is_on_the_storey_beside_it(tmp_path):

@@ -1,7 +1,8 @@
 """What expectations are worth, and when they are violated, against a twin that goes step by step."""
 
+import operator
 from datetime import datetime, timedelta
-from typing import Any
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -25,12 +26,12 @@ from fleet2d.expectations import (
     since,
     until,
 )
-from fleet2d.expectations.expectation import Expectation, RunSignals, Trace
+from fleet2d.expectations.expectation import RunSignals, Trace
 from fleet2d.expectations.verdict import verdict_of
 from fleet2d.runtime.clock import Clock
 
 
-def seconds(limit: Any) -> Any:
+def seconds(limit):
     """Return a limit in steps of a second as one of an expectation."""
     if isinstance(limit, tuple):
         return tuple(map(seconds, limit))
@@ -38,23 +39,30 @@ def seconds(limit: Any) -> Any:
 
 
 CLOCK = Clock(datetime(2026, 1, 5), 1_000_000, 1000)
+
+
+def within(build):
+    """What builds an expectation of a window that is given in steps."""
+    return lambda *parts: build(*parts[:-1], within=seconds(parts[-1]))
+
+
 BUILD = {
-    "is": lambda name: moving(name),
+    "is": moving,
     "above": lambda name, limit: metric(name) > limit,
     "less": lambda one, other: metric(one) < metric(other),
-    "not": lambda part: ~part,
-    "implies": lambda one, other: implies(one, other),
-    "once": lambda part, steps: once(part, within=seconds(steps)),
-    "since": lambda hold, goal, steps: since(hold, goal, within=seconds(steps)),
-    "and": lambda one, other: one & other,
-    "or": lambda one, other: one | other,
-    "always": lambda part, steps: always(part, within=seconds(steps)),
-    "eventually": lambda part, steps: eventually(part, within=seconds(steps)),
-    "until": lambda hold, goal, steps: until(hold, goal, within=seconds(steps)),
-    "after": lambda trigger, part, steps: after(trigger, part, within=seconds(steps)),
+    "not": operator.invert,
+    "and": operator.and_,
+    "or": operator.or_,
+    "implies": implies,
     "holds_for": lambda part, steps: holds_for(part, f"{steps} s"),
+    "once": within(once),
+    "since": within(since),
+    "always": within(always),
+    "eventually": within(eventually),
+    "until": within(until),
+    "after": within(after),
 }
-atoms: st.SearchStrategy[Any] = st.sampled_from(
+atoms = st.sampled_from(
     [("is", "a"), ("is", "b"), ("above", "x", 0.5), ("above", "y", -0.5), ("less", "x", "y")]
 )
 some = st.integers(0, 6)
@@ -74,7 +82,7 @@ truths = st.lists(st.integers(0, 1), min_size=14, max_size=14)
 numbers = st.lists(st.sampled_from([-2.0, -1.0, 0.0, 1.0, 2.0]), min_size=14, max_size=14)
 
 
-def built(formula: Any) -> Any:
+def built(formula):
     """Return a formula of the twin as an expectation."""
     if not isinstance(formula, tuple) or isinstance(formula[0], int):
         return formula
@@ -85,19 +93,19 @@ def built(formula: Any) -> Any:
     return BUILD[word](*names)
 
 
-def trace_of(values: list[float], end: int) -> Trace:
+def trace_of(values, end):
     array = np.array(values[:end], np.float64)
     is_first = np.append(True, array[1:] != array[:-1])
     return Trace(np.flatnonzero(is_first), array[is_first], end)
 
 
-def known_of(signals: dict[str, list[float]], end: int, *, over: bool) -> RunSignals:
+def known_of(signals, end, *, over):
     names = {"a": moving("a"), "b": moving("b"), "x": metric("x"), "y": metric("y")}
     traces = {str(names[name]): trace_of(v, end) for name, v in signals.items() if name in names}
     return RunSignals(traces, {}, 0, end, over, CLOCK)
 
 
-def dense(trace: Trace) -> list[float]:
+def dense(trace):
     return np.repeat(trace.value, np.diff(np.append(trace.start, trace.end))).tolist()
 
 
@@ -112,19 +120,19 @@ def test_the_robustness_of_each_step_equals_the_reference(formula, a, b, x, y, e
     assert expected == dense(built(formula).robustness(known, high))
 
 
-def violated(expectation: Expectation, signals: dict[str, list[float]]) -> list[tuple[int, int]]:
+def violated(expectation, signals):
     known = known_of(signals, 14, over=True)
     return [(v.first, v.last) for v in verdict_of("", expectation, known).violations]
 
 
 @given(numbers)
 def test_violations_are_the_longest_stretches_that_fail(x):
-    wrong = [step for step, number in enumerate(x) if not number > 0]
-    begins = [step for step in wrong if step - 1 not in wrong]
-    ends = [step for step in wrong if step + 1 not in wrong]
+    stretches = groupby(range(14), lambda step: x[step] > 0)
+    steps = [list(steps) for holds, steps in stretches if not holds]
+    expected = [(stretch[0], stretch[-1]) for stretch in steps]
 
-    assert list(zip(begins, ends, strict=True)) == violated(always(metric("x") > 0), {"x": x})
-    assert list(zip(begins, ends, strict=True)) == violated(never(~(metric("x") > 0)), {"x": x})
+    assert expected == violated(always(metric("x") > 0), {"x": x})
+    assert expected == violated(never(~(metric("x") > 0)), {"x": x})
 
 
 def test_a_signal_on_its_limit_is_on_the_side_of_the_comparison():
@@ -173,7 +181,7 @@ def test_an_expectation_is_decided_as_soon_as_nothing_can_change_it():
     b = [0, 0, 0, 1] + [0] * 10
     expectation = eventually(moving("b"), within="5 s")
 
-    def at(end: int) -> tuple[bool, bool]:
+    def at(end):
         verdict = verdict_of("", expectation, known_of({"b": b}, end, over=False))
         return verdict.holds, verdict.decided
 
