@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.entities.robots.test_interact import PILL, ana, events_of, home
+from tests.entities.robots.test_interact import PILL, ana, home
 from tests.scenes import table
 
 import fleet2d
@@ -113,24 +113,6 @@ def timed(policy, duration="3 h", **changes):
         interactions={"pill": PILL | {"at": [], "every": "1 h", "within": "1 h"}},
         **changes,
     )
-
-
-def test_answers_reach_the_learner_and_its_chances_reach_the_robot():
-    policy = {"type": "thompson", "ask_at": 0.5}
-    run = fleet2d.run(timed(policy, users={"ana": ana(outcomes=("declined",))}))
-    rows = table(run, "when")
-    last = rows["step"] == rows["step"].max()
-    asked_in = {
-        (r, int(h))
-        for r, h, c in zip(
-            rows["room"][last], rows["hour"][last], rows["chance"][last], strict=True
-        )
-        if c < 0.45
-    }
-
-    assert any("kitchen" in str(room) for room, _ in asked_in)
-    assert {7, 8, 9} & {hour for _, hour in asked_in}
-    assert "opportunity" in {event for _, event in events_of(run, "opportunity")}
 
 
 def test_hours_that_no_day_has_are_refused():

@@ -35,59 +35,47 @@ def lost(duration="30 min", camera=None, **localization):
 
 def slow_offset(settings, step, units=1280):
     """The error at a step, draw by draw."""
-    every_us = int(settings.corrected_every.total_seconds() * 10**6)
-    interval, elapsed_us = divmod(step * 10**6, every_us)
-
-    def draw(purpose):
-        return random_bell(stream_key(4, "robots.astro", f"localization: {purpose}"), interval)
+    every_s = settings.corrected_every.total_seconds()
+    interval, elapsed_s = divmod(step, int(every_s))
 
     def key(purpose):
         return stream_key(4, "robots.astro", f"localization: {purpose}")
 
-    def noise(value):
-        return round(value / 209.0215299915 * 65536)
+    def noise(purpose, value):
+        return random_bell(key(purpose), interval) * round(value / 209.0215299915 * 65536)
 
     def grown(value):
-        return value * (elapsed_us // 1000) // 60_000
+        return value * elapsed_s * 1000 // 60_000
 
-    hours = settings.corrected_every.total_seconds() / 3600
-    jumps = random_uniform(key("jumps"), interval) < settings.jumps_per_hour * hours
-    jumped = jumps and elapsed_us >= random_below(key("when"), interval, every_us)
+    is_off = random_uniform(key("jumps"), interval) < settings.jumps_per_hour * every_s / 3600
+    when_us = random_below(key("when"), interval, int(every_s) * 10**6)
+    is_off = is_off and elapsed_s * 10**6 >= when_us
     offset = []
     for axis in "xy":
-        value = draw(f"left {axis}") * noise(settings.left * units)
-        value += draw(f"jump {axis}") * noise(settings.jump * units) if jumped else 0
-        value += grown(draw(f"drift {axis}") * noise(settings.drift * units))
+        value = noise(f"left {axis}", settings.left * units)
+        value += noise(f"jump {axis}", settings.jump * units) if is_off else 0
+        value += grown(noise(f"drift {axis}", settings.drift * units))
         offset.append(value // 65536)
-    turn = grown(draw("turn") * noise(settings.drift_deg / 360 * TURN)) // 65536
-    return offset[0], offset[1], turn
+    return (*offset, grown(noise("turn", settings.drift_deg / 360 * TURN)) // 65536)
 
 
 def test_the_error_is_that_of_its_slow_twin():
     settings = Localization.model_validate(WRONG)
     drift = Drift(settings, 1280, 10**6, 4, "robots.astro")
-    steps = np.array([0, 1, 100, 239, 240, 241, 3600, 86_399, 10**7, 17])
-    fast = drift.at(steps)
-    slow = [slow_offset(settings, step) for step in steps.tolist()]
-    assert slow == list(zip(*(column.tolist() for column in fast), strict=True))
+    steps = np.array([0, 1, 100, 239, 240, 241, 3600, 86_399, 10**7, 17, *range(30, 5000, 97)])
+    slow = np.array([slow_offset(settings, step) for step in steps.tolist()])
+    assert slow.tolist() == np.stack(drift.at(steps), axis=1).tolist()
 
-
-def test_points_are_put_where_its_slow_twin_puts_them():
-    settings = Localization.model_validate(WRONG)
-    drift = Drift(settings, 1280, 10**6, 4, "robots.astro")
-    steps = np.arange(0, 5000, 97)
-    draws = np.random.default_rng(1).integers(0, 20_000, (4, len(steps)))
-    placed = np.stack(drift.misplace(*draws, steps), axis=1).tolist()
-    for step, (x, y, at_x, at_y), point in zip(
-        steps.tolist(), draws.T.tolist(), placed, strict=True
-    ):
-        off_x, off_y, turn = slow_offset(settings, step)
-        along, up, half = cosine(turn % TURN), sine(turn % TURN), UNIT // 2
-        dx, dy = x - at_x, y - at_y
-        assert point == [
-            at_x + off_x + (dx * along - dy * up + half) // UNIT,
-            at_y + off_y + (dx * up + dy * along + half) // UNIT,
-        ]
+    x, y, at_x, at_y = np.random.default_rng(1).integers(0, 20_000, (4, len(steps)))
+    along, up = (np.array([f(turn % TURN) for turn in slow[:, 2].tolist()]) for f in (cosine, sine))
+    dx, dy, half = x - at_x, y - at_y, UNIT // 2
+    placed = drift.misplace(x, y, at_x, at_y, steps)
+    assert (
+        placed[0].tolist() == (at_x + slow[:, 0] + (dx * along - dy * up + half) // UNIT).tolist()
+    )
+    assert (
+        placed[1].tolist() == (at_y + slow[:, 1] + (dx * up + dy * along + half) // UNIT).tolist()
+    )
 
 
 def test_what_is_seen_is_off_as_the_robot_is():

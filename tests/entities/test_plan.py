@@ -124,16 +124,6 @@ def test_notes_are_told_at_the_first_step_not_before_them():
 # --- Who decides -------------------------------------------------------------------------------
 
 
-def test_the_first_behavior_with_a_plan_is_followed():
-    third, decide_third = recording_steps(minute)
-    second, decide_second = recording_steps(lambda now: minute(now) if now.step >= 120 else None)
-    first, decide_first = recording_steps(lambda now: minute(now) if now.step == 180 else None)
-    run(decide_first, decide_second, decide_third)
-    assert [0, 60, 120, 180, 240] == first
-    assert [0, 60, 120, 240] == second
-    assert [0, 60] == third
-
-
 @pytest.mark.parametrize("decide", [(), (lambda now: None,)], ids=["no behavior", "no plan"])
 def test_without_a_plan_it_stays_still(decide):
     poses = path(run(*decide), "ana")
@@ -172,20 +162,18 @@ def watched(decide, *others, **camera):
 
 
 def test_events_that_a_plan_names_end_it_at_the_next_step():
-    situations = []
+    told = []
 
     def decide(now):
-        situations.append((now.step, [(e.event, e.user, e.x, e.y) for e in now.events]))
+        told.extend((now.step, e.event, e.user, e.x, e.y) for e in now.events)
         return now.plan().interrupt_on("user_seen", "user_lost").stay()
 
     stored = fleet2d.run(watched(decide))
     events, seen = table(stored, "events", entity="astro"), table(stored, "observations")
     assert ["user_seen", "user_lost", "user_seen"] == events["event"].tolist()
-    expected = [(0, [])]
-    for step, event in zip(events["step"].tolist(), events["event"].tolist(), strict=True):
-        last = np.flatnonzero(seen["step"] <= step)[-1]  # where she was perceived last
-        expected.append((step + 1, [(event, "ana", seen["x"][last], seen["y"][last])]))
-    assert expected == situations
+    last = np.searchsorted(seen["step"], events["step"], side="right") - 1
+    expected = zip(events["step"] + 1, events["event"], ["ana"] * 3, seen["x"][last], seen["y"][last], strict=True)  # fmt: skip
+    assert [*expected] == told
 
 
 # --- What a behavior may not do ----------------------------------------------------------------

@@ -43,25 +43,28 @@ def moments(log):
 
 
 @pytest.mark.parametrize(
-    ("tag", "x"), [("007", [9.0, 9.1, 9.2]), ("7", [12.0, 12.1])], ids=["007", "7"]
+    ("spelling", "tag", "x"),
+    [
+        ({}, "007", [9.0, 9.1, 9.2]),
+        ({}, "7", [12.0, 12.1]),
+        ({",007,": ",0x6733,"}, "0x6733", [9.0, 9.1, 9.2]),
+    ],
 )
-def test_a_leading_zero_makes_another_tag(tmp_path, tag, x):
-    log = positions(csv(tmp_path, TAGS), id=tag)
+def test_a_tag_is_named_as_in_the_file(tmp_path, spelling, tag, x):
+    text = TAGS
+    for old, new in spelling.items():
+        text = text.replace(old, new)
 
-    assert log.xy[:, 0].tolist() == x
-
-
-def test_tags_that_are_one_number_are_several(tmp_path):
-    with pytest.raises(LogError, match="holds 2 ids: 007, 7: select one by 'id'"):
-        read_log(csv(tmp_path, TAGS))
+    assert positions(csv(tmp_path, text), id=tag).xy[:, 0].tolist() == x
 
 
-def test_hexadecimal_tags_are_named_as_in_the_file(tmp_path):
-    path = csv(tmp_path, TAGS.replace(",007,", ",0x6733,").replace(",7,", ",0x6734,"))
-
-    assert positions(path, id="0x6733").xy[:, 0].tolist() == [9.0, 9.1, 9.2]
-    with pytest.raises(LogError, match="There are: 0x6733, 0x6734"):
-        read_log(path, id="26419")
+@pytest.mark.parametrize(
+    ("tag", "message"),
+    [(None, "holds 2 ids: 007, 7: select one by 'id'"), ("07", "There are: 007, 7")],
+)
+def test_tags_that_are_one_number_are_several(tmp_path, tag, message):
+    with pytest.raises(LogError, match=message):
+        read_log(csv(tmp_path, TAGS), id=tag)
 
 
 @pytest.mark.parametrize(

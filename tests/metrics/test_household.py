@@ -136,11 +136,3 @@ def test_sleepers_and_people_in_bathrooms_are_disturbed(place, activity, near, d
     assert [near, disturbing] == pytest.approx(
         [terms["near_min"], terms["disturbing_min"]], abs=0.3
     )
-
-
-@pytest.mark.parametrize(
-    ("activity", "expected"),
-    [("tv", True), ("cook", True), ("care", True), ("study", False), ("shower", False)],
-)
-def test_who_is_busy_has_no_time(activity, expected):
-    assert expected == has_time(activity)

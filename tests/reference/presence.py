@@ -1,6 +1,5 @@
 """Slow, obvious twins of the estimators and measures of presence: loops, and all paths of a chain."""
 
-import cmath
 import math
 from itertools import pairwise, permutations, product
 
@@ -121,19 +120,15 @@ def people(model, day, prior, future):
     return chains
 
 
-def fremen(minutes, weight, state, days, m, at):
+def fremen(minutes, state, days, m, at):
     """The forecast of order m at a minute of the week, from samples of one room, by definition."""
-    n = sum(weight)
-    mean = sum(state) / n
-    found = []
-    for i in range(1, 101):
-        turn = [cmath.exp(2j * math.pi * t * i / WEEK) for t in minutes]
-        gamma = sum((s - mean * w) * z for s, w, z in zip(state, weight, turn, strict=True)) / n
-        if 1.5 * 7 / i <= days:
-            found.append((abs(gamma), i, cmath.phase(gamma)))
-    found.sort(key=lambda f: -f[0])
-    p = mean + sum(2 * a * math.cos(2 * math.pi * at * i / WEEK - phi) for a, i, phi in found[:m])
-    return min(max(p, 0.0), 1.0)
+    mean = np.mean(state)
+    orders = np.array([i for i in range(1, 101) if 1.5 * 7 / i <= days])
+    turns = np.exp(2j * np.pi * np.outer(orders, minutes) / WEEK)
+    gamma = (turns * (state - mean)).mean(axis=1)
+    best = np.argsort(-np.abs(gamma), kind="stable")[:m]
+    waves = 2 * np.abs(gamma) * np.cos(2 * np.pi * at * orders / WEEK - np.angle(gamma))
+    return float(np.clip(mean + waves[best].sum(), 0, 1))
 
 
 def transport(truth, estimate, cost):

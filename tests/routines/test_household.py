@@ -33,15 +33,6 @@ def at_home(episode):
     return not catalogue()[episode.activity].away
 
 
-def test_days_do_not_depend_on_the_order_in_which_they_are_asked_for():
-    straight = lives(welcome=0.5)
-    days = [straight.day(MONDAY + i) for i in range(30)]
-    hopping = lives(welcome=0.5)
-    assert [days[20], days[3], days[29], days[12]] == [
-        hopping.day(MONDAY + i) for i in (20, 3, 29, 12)
-    ]
-
-
 def test_no_day_of_a_crowded_household_breaks_a_constraint():
     home = lives()
     for i in range(60):

@@ -1,6 +1,7 @@
 """Long-term and real-time presence in whole runs: outputs, rows, errors, and what others read."""
 
 import numpy as np
+import polars as pl
 import pytest
 from tests.scenes import digests, run, scenario, table
 
@@ -45,15 +46,14 @@ def stored():
 
 def test_shares_of_each_user_and_hour_sum_to_one(stored):
     for name in stored.manifest["scenario"]["algorithms"]:
-        rows = table(stored, name)
-        is_room = rows["room"] != "away"
-        updates = rows["step"] * 10 + np.unique(rows["user"], return_inverse=True)[1]
-        sums = [rows["share"][is_room & (updates == update)] for update in np.unique(updates)]
-        assert {6} == {len(shares) for shares in sums}
-        assert [1.0] * len(sums) == pytest.approx([shares.sum() for shares in sums]), name
-        away = rows["share"][~is_room]
+        rows = stored.polars(name)
+        rooms = rows.filter(pl.col("room") != "away").group_by("step", "user")
+        sums = rooms.agg(pl.len(), pl.sum("share"))
+        assert {6} == set(sums["len"]), name
+        assert [1.0] * len(sums) == pytest.approx(sums["share"].to_list()), name
+        away = rows.filter(room="away")["share"]
         assert len(sums) == len(away)
-        assert ((away >= 0) & (away <= 1)).all()
+        assert away.is_between(0, 1).all()
 
 
 @pytest.mark.parametrize("name", sorted({*ESTIMATORS} - {"fremen"}))
@@ -108,6 +108,7 @@ def test_presence_is_defined_without_users_or_cameras(robots):
 def test_a_model_of_ones_own_is_read_by_its_path(tmp_path):
     code = """
 import numpy as np
+import polars as pl
 from fleet2d.algorithms.presence.model import Model
 
 class Sure(Model):

@@ -4,7 +4,6 @@ import copy
 from datetime import datetime, timedelta
 
 import numpy as np
-import polars as pl
 import pytest
 
 from fleet2d.algorithms.presence.belief import Presence, WeeklyPresence, slot_of_week
@@ -61,7 +60,6 @@ def test_presence_of_an_unknown_user_is_refused_by_name():
         ({"home": np.array([[0.75, 0.5], [0.5, 0.5]])}, "'ana' is not a distribution.*1.25"),
         ({"home": np.array([[0.5, 0.5], [np.nan, 0.5]])}, "'anyone' is not a distribution.*nan"),
         ({"home": np.array([[1.5, -0.5], [0.5, 0.5]])}, "'ana' is not a distribution"),
-        ({"away": np.array([0.5, np.nan])}, "'anyone'.*away nan"),
         ({"away": np.array([-0.1, 0.5])}, "'ana'.*away -0.1"),
         ({"away": np.array([0.5])}, "of shape"),
         ({"home": np.array([[0.5, 0.5]])}, "needs shares of shape"),
@@ -99,25 +97,19 @@ def test_each_hour_of_the_week_has_its_own():
 
 
 @pytest.mark.parametrize("half_life", [None, 2.0])
-def test_sums_by_day_and_hour_equal_those_of_polars(half_life):
+def test_sums_by_day_and_hour_equal_those_of_numpy(half_life):
     random = np.random.default_rng(1)
-    day = np.sort(random.choice([100, 101, 103, 109, 110], 300))
-    minute = random.integers(0, 1440, 300)
-    minute = minute[np.lexsort((minute, day))]
+    days = random.choice([100, 101, 103, 109, 110], 300)
+    day, minute = np.divmod(np.sort(days * 1440 + random.integers(0, 1440, 300)), 1440)
     values = random.random(300)
     counts = DayCounts((1,), half_life)
-    for begin in range(0, 300, 17):
-        part = slice(begin, begin + 17)
+    for part in np.split(np.arange(300), range(17, 300, 17)):
         counts.add(day[part], minute[part], values[part, None])
 
-    weight = 0.5 ** ((110 - day) / (half_life or np.inf))
-    rows = pl.DataFrame(
-        {"day": day, "hour": (day - 1) % 7 * 24 + minute // 60, "sum": values * weight}
-    )
-    by_day, by_hour = (rows.group_by(by).agg(pl.sum("sum")).sort(by) for by in ("day", "hour"))
-    assert rows["sum"].sum() == pytest.approx(counts.total[0])
-    assert by_day["day"].to_list()[:-1] == counts.days
-    assert by_day["sum"].to_list()[:-1] == pytest.approx(np.ravel(counts.weighted_days).tolist())
-    week = np.zeros(168)
-    week[by_hour["hour"]] = by_hour["sum"]
-    assert week == pytest.approx(counts.by_hour_of_week[:, 0])
+    weighted = values * 0.5 ** ((110 - day) / (half_life or np.inf))
+    hour = (day - 1) % 7 * 24 + minute // 60
+    assert weighted.sum() == pytest.approx(counts.total[0])
+    assert [100, 101, 103, 109] == counts.days
+    by_day = np.bincount(day, weighted)[counts.days]
+    assert by_day == pytest.approx(np.ravel(counts.weighted_days))
+    assert np.bincount(hour, weighted, 168) == pytest.approx(counts.by_hour_of_week[:, 0])

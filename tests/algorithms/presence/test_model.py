@@ -148,13 +148,11 @@ def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting():
     seen[4, :, 1] = 1
     model = MarkovDecay()
     track = followed(model, evidence_of(watched, seen), 3, 1).track
-    now = model.presence(["u0"], MONDAY, MINUTE, track)
     steps = steps_of(model.learner.people.model_of(0))
     away = track.away[4:, :1]
     belief = np.hstack([track.home[4:, 0] * (1 - away), away])
-    powers = [np.linalg.matrix_power(steps, t)[1] for t in range(36)]
-    assert belief == pytest.approx(np.array(powers), abs=5e-3)  # a false alarm is possible, too
-    assert belief[-1] == pytest.approx(now.with_away("u0"))
+    powers = np.array([np.linalg.matrix_power(steps, t)[1] for t in range(36)])
+    assert belief == pytest.approx(powers, abs=5e-3)  # a false alarm is possible, too
     # Three rooms in view in vain: the filter knows that the user is out.
     filtered = followed(Filter(), evidence_of(watched, seen), 3, 1).track
     assert filtered.away[39, 0] > 0.9 > 0.4 > track.away[39, 0]

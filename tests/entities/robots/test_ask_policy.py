@@ -83,19 +83,21 @@ def test_mask_has_what_is_open_and_the_wait():
 
 
 def test_observation_is_of_the_queue_and_the_answers():
-    outcomes = ("declined", "accepted")
-    content = asking(users={"ana": ana(outcomes=outcomes)})
+    content = asking(users={"ana": ana(outcomes=("declined", "accepted"))})
     _, rows = choices(content, lambda _, mask: int(mask.argmax()))
     first, last = rows[0][1], rows[-1][1]
 
     assert (3, len(ASK_COLUMNS)) == first.shape
-    assert [1, 1, 0] == first[:, AT["interaction"]].tolist()
-    assert [1, 0, 0] == first[:, AT["open"]].tolist()
-    assert [1, 0, 0] == first[:, AT["do_remind"]].tolist()
-    assert pytest.approx([2 / 3, 1 / 3, 0]) == first[:, AT["worth"]].tolist()
+    expected = {
+        "interaction": [1, 1, 0],
+        "open": [1, 0, 0],
+        "do_remind": [1, 0, 0],
+        "worth": [2 / 3, 1 / 3, 0],
+    }
+    for name, column in expected.items():
+        assert column == pytest.approx(first[:, AT[name]]), name
     assert [0.5, 0.5] == first[:2, AT["yes"]].tolist()
-    assert pytest.approx(1 / 3) == last[0, AT["yes"]]  # asked once, and declined
-    assert pytest.approx(2 / 3) == last[1, AT["time_now"]]
+    assert pytest.approx([1 / 3, 2 / 3]) == [last[0, AT["yes"]], last[1, AT["time_now"]]]
     assert last[0, AT["asked_1h"]] > 0.5
     assert max(np.abs(table).max() for _, table, _ in rows) <= 1
 

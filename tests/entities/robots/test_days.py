@@ -1,75 +1,17 @@
-"""A day of each behavior in real homes, beside a person on a schedule."""
+"""All behaviors of robots at once."""
 
 import copy
 
-import numpy as np
 import pytest
 from tests.entities.robots.robots import (
-    SHARE,
     assert_same_for_every_max_span,
     events,
     home_with,
 )
-from tests.scenes import digests, path, run
+from tests.scenes import digests
 from tests.thorough import THOROUGH
 
 import fleet2d
-from fleet2d.kernels import strictly_inside
-
-PATROL = {"type": "patrol", "dwell": "5 min"}
-# Short, for the patrol charges a little each time that it stops in the charger's room.
-BATTERY = {"driving": "1 h", "standing": "3 h", "charging": "2 h", "charger": "any"}
-# Which behaviors, and which events they must have brought about in a day.
-DAYS = {
-    "explore": (
-        ["explore", {"type": "opportunistic", "cooldown": "10 min"}, PATROL],
-        {"explored", "interacts"},
-    ),
-    "follow": ([{"type": "follow", "longest": "10 min", "cooldown": "1 h"}, PATROL], {"follows"}),
-    "all": (
-        [
-            "dock",
-            {
-                "type": "scheduled",
-                "visits": [{"at": "09:00", "place": "any", "task": "water"}],
-                "late": "2 h",  # it may be charging
-            },
-            {"type": "find", "user": "ana", "every": "3 h", "source": "share"},
-            {"type": "opportunistic", "when": "08:00-22:00", "cooldown": "30 min"},
-            {"type": "patrol", "when": "weekdays 10:00-11:00"},
-            {"type": "hangout", "source": "share", "quiet": "22:00-07:00"},
-        ],
-        {"visits", "find_begins", "relocates", "docks"},
-    ),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "which"),
-    [("explore", 0), ("follow", -1), ("all", -1)],
-)
-def test_a_day_of_a_behavior_in_a_real_home(shared_data, name, which):
-    behaviors, expected = DAYS[name]
-    file = sorted((shared_data / "houseexpo").glob("*.json"))[which]
-    ana = fleet2d.load_scenario("bundled:paper").users["ana"].model_dump(mode="json")
-    battery = {"battery": BATTERY} if "dock" in behaviors else {}
-    content = {
-        "simulation": {"start": "2026-01-10", "duration": "1 d", "seed": 4},
-        "floorplan": {"type": "houseexpo", "path": str(file)},
-        "users": {"ana": ana},
-        "robots": {"astro": {"behaviors": behaviors, "gives_way": {}, **battery}},
-        "algorithms": SHARE,
-    }
-    stored = run(content)
-    assert expected <= {event for _, event, _ in events(stored)}
-    # The body never leaves the space that it fits in.
-    plan, poses = stored.plan, path(stored, "astro")
-    points = np.unique(plan.lattice.to_lattice(np.stack([poses.x, poses.y], axis=1)), axis=0)
-    some = points[:: max(1, len(points) // 500)].tolist()
-    assert all(strictly_inside(plan.mesh, x, y) for x, y in some)
-    space = fleet2d.Home(plan).space(0.15)
-    assert np.mean([space.part_at(x, y) >= 0 for x, y in some]) > 0.8  # ways touch its corners
 
 
 def product():

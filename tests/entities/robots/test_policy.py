@@ -115,15 +115,6 @@ def test_observation_describes_the_home_and_pads_it():
     assert np.abs(table).max() <= 1
 
 
-def test_rooms_without_a_way_are_masked_and_rest_is_always_possible():
-    masks = []
-    lives(home_with([policy()], "30 min"), lambda _, __, mask: masks.append(mask) or 16)
-    storage = Simulation(home_with([policy()])).home.plan.room("storage_1").index
-
-    expected = [n < 6 and n != storage for n in range(16)]
-    assert [*expected, True] == masks[0].tolist()
-
-
 @pytest.mark.parametrize(
     ("action", "reason"),
     [(4, "can't be reached"), (7, "doesn't exist"), (17, "from 0 to 16"), (-1, "from 0 to 16")],

@@ -3,7 +3,6 @@
 import statistics
 from collections import Counter
 from datetime import date
-from itertools import pairwise
 
 import pytest
 from tests.routines.days import MONDAY
@@ -50,16 +49,6 @@ def test_shares_of_many_people_follow_the_survey_hour_by_hour():
     assert 48 == len(distances)
     assert statistics.median(distances) < 0.03
     assert max(distances) < 0.10
-
-
-def test_days_follow_each_other_without_a_gap():
-    actor = Simulation(scenario("5 min", users=users(1))).actors["user_0"]
-    days = [actor.behaviors[0].day(MONDAY + i) for i in range(20)]
-    for day, after in pairwise(days):
-        assert all(one.end == other.begin for one, other in pairwise(day))
-        assert all(episode.begin < episode.end for episode in day)
-        assert (4 * HOUR, 28 * HOUR) == (day[0].begin, day[-1].end)
-        assert 4 * HOUR == after[0].begin
 
 
 def test_hardly_a_day_of_the_retired_has_no_meal_at_home():

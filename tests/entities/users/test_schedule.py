@@ -125,20 +125,6 @@ def test_agendas_hold_on_their_days(start, room):
     assert room == fleet2d.Simulation(content).state["ana"]["room"]
 
 
-def test_the_agenda_of_the_next_day_follows_at_midnight():
-    content = one(
-        agenda({"at": "06:00", "place": "kitchen"}, on=["monday", "wednesday"]),
-        agenda({"at": "00:00", "place": "bedroom"}, {"at": "12:00", "place": "bathroom"}, on="tuesday"),
-        duration="3 d",
-        simulation={"step": "1 min"},
-    )  # fmt: skip
-    names = rooms(run(content))
-    hours = [names[hour * 60] for hour in (0, 16, 17, 18, 29, 30, 47, 48)]  # since Monday at 7
-    kitchen, bedroom, bathroom = "kitchen_1", "bedroom_1", "bathroom_1"
-    # At midnight it sets out.
-    assert [kitchen, kitchen, kitchen, bedroom, bedroom, bathroom, bathroom, kitchen] == hours
-
-
 @pytest.mark.parametrize(
     ("start", "room"),
     [
