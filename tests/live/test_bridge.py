@@ -337,60 +337,36 @@ def test_a_scenario_does_not_talk_to_other_machines_by_itself():
         open_peers(changed)
 
 
-def ordered(*messages) -> tuple[list[Any], dict[str, int], list[str]]:
-    """Return what is done with messages that arrive in one step, what is counted, and told."""
-    run, peer, bridge = bridged({3: list(messages)})
-    acts = [(act["do"], act.get("to")) for act in run.manifest["interventions"]]
-    return acts, dict(bridge.counts), peer.told
-
-
 HALLWAY = GOAL | {"to": "hallway_1", "id": "second"}
 VELOCITY = {"type": "velocity", "entity": "astro", "forward": 0.1}
+CANCEL = {"type": "cancel", "entity": "astro"}
+ORDERED = {
+    "a goal after a velocity": ([GOAL, VELOCITY, HALLWAY], "steer, send hallway_1", "replaced"),
+    "a velocity after a goal": ([VELOCITY, GOAL, VELOCITY], "send kitchen_1, steer", "replaced"),
+    "a goal after one that is withdrawn": ([GOAL, CANCEL, HALLWAY], "send hallway_1", "replaced"),
+    "the same by its name": (
+        [GOAL | {"id": "first"}, CANCEL | {"id": "first"}, HALLWAY], "send hallway_1", "replaced",
+    ),
+    "a pose that is refused": ([pose(1), pose(1) | {"x": -90.0}], "put", "wrong"),
+    "a goal that is refused": ([GOAL, GOAL | {"to": "kitchn_1"}], "send kitchen_1", "wrong"),
+    "a client that is gone": ([GOAL, None], "send kitchen_1, release", "withdrawn"),
+    "a client that came back": ([GOAL, None, HALLWAY], "send hallway_1", "replaced"),
+}  # fmt: skip
 
 
-def test_messages_of_one_step_count_in_the_order_of_their_arrival():
-    acts, counts, _ = ordered(GOAL, VELOCITY, HALLWAY)
-    assert acts == [("steer", None), ("send", "hallway_1")]
-    assert counts == {"received": 3, "replaced": 1, "applied": 2}
+@pytest.mark.parametrize("case", ORDERED)
+def test_messages_of_one_step_count_in_the_order_of_their_arrival(case):
+    messages, acts, counted = ORDERED[case]
+    run, peer, bridge = bridged({3: messages})
 
-    acts, _, _ = ordered(VELOCITY, GOAL, VELOCITY)
-    assert [act for act, _ in acts] == ["send", "steer"]
-
-
-@pytest.mark.parametrize("name", ["", "first"])
-def test_a_goal_after_a_withdrawn_one_stays(name):
-    cancel = {"type": "cancel", "entity": "astro", "id": name}
-
-    acts, counts, told = ordered(GOAL | {"id": "first"}, cancel, HALLWAY)
-
-    assert acts == [("send", "hallway_1")]
-    assert counts == {"received": 3, "replaced": 2, "applied": 1}
-    assert told == []
-
-
-@pytest.mark.parametrize(
-    ("right", "wrong"),
-    [
-        (pose(1), pose(1) | {"x": -90.0}),
-        (GOAL, GOAL | {"to": "kitchn_1"}),
-    ],
-)
-def test_a_message_that_is_refused_replaces_none(right, wrong):
-    alone, _, _ = ordered(right)
-    acts, counts, told = ordered(right, wrong)
-
-    assert acts == alone
-    assert counts == {"received": 2, "applied": 1, "wrong": 1}
-    assert len(told) == 1
-
-
-def test_a_goal_of_a_client_that_came_back_within_a_step_stays():
-    acts, counts, _ = ordered(GOAL, None, HALLWAY)
-    assert acts == [("send", "hallway_1")]
-
-    acts, counts, _ = ordered(GOAL, None)
-    assert [act for act, _ in acts] == ["send", "release"]
-    assert counts["withdrawn"] == 1
+    done = run.manifest["interventions"]
+    assert acts == ", ".join(
+        f"{act['do']} {act['to']}" if act["do"] == "send" else act["do"] for act in done
+    )
+    assert len(messages) == bridge.counts["received"] + messages.count(None)
+    assert bridge.counts["applied"] == len(done) - acts.count("release")
+    assert bridge.counts[counted] == (2 if "withdrawn" in case or "name" in case else 1)
+    assert len(peer.told) == (counted in ("wrong", "withdrawn"))
 
 
 # Frames that don't fit

@@ -218,30 +218,31 @@ def test_a_deleted_file_is_made_again_with_its_shard_only(data, tmp_path):
     assert not (root / "unfinished").exists()
 
 
-def test_a_deleted_file_of_another_version_is_not_made_again(data, tmp_path):
-    root = tmp_path / "copy"
-    shutil.copytree(data.root, root)
-    manifest = json.loads((root / "dataset.json").read_text())
-    manifest["versions"]["fleet2d"] = "0.0.1"
-    (root / "dataset.json").write_text(json.dumps(manifest))
-    (root / "test" / "rooms-00000.parquet").unlink()
-
-    with pytest.raises(
-        InputError, match=r"lacks test/rooms-00000.parquet, which Fleet2D 0\.0\.1 can"
-    ):
-        make(root)
+ROOMS = "test/rooms-00000.parquet"
 
 
 @pytest.mark.slow
-def test_a_file_that_can_not_be_made_again_as_it_was_is_refused(data, tmp_path):
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda m: m["versions"].update(fleet2d="0.0.1"),
+            f"lacks {ROOMS}, which Fleet2D 0.0.1 can",
+        ),
+        (lambda m: m["files"][ROOMS].update(sha256="0" * 64), "differ now from those that were"),
+    ],
+)
+def test_a_deleted_file_that_can_not_be_made_again_as_it_was_is_refused(
+    data, tmp_path, change, message
+):
     root = tmp_path / "copy"
     shutil.copytree(data.root, root)
     manifest = json.loads((root / "dataset.json").read_text())
-    manifest["files"]["test/rooms-00000.parquet"]["sha256"] = "0" * 64
+    change(manifest)
     (root / "dataset.json").write_text(json.dumps(manifest))
-    (root / "test" / "rooms-00000.parquet").unlink()
+    (root / ROOMS).unlink()
 
-    with pytest.raises(InputError, match="differ now from those that were written"):
+    with pytest.raises(InputError, match=message):
         make(root)
 
 
