@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from tests.thorough import examples
 
+from fleet2d.artifacts.arrow import schema_of
 from fleet2d.artifacts.store import RunStore
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.artifacts.unfinished import (
@@ -244,6 +245,18 @@ def test_rows_that_no_run_stores_are_refused(tmp_path, column, arrays, words):
     unfinished.journal.close()
     with pytest.raises(ArtifactError, match=f"journal is damaged .*{words}"):
         open_run(directory).arrow("t")
+
+
+def test_two_tables_of_one_name_are_refused(tmp_path):
+    directory = kill(begin_run(tmp_path / "run"))
+    writer = FrameWriter(directory / FOLDER / JOURNAL_NAME, JOURNAL)
+    for _ in range(2):
+        writer.add("table", "{}", schema_of(LATE).serialize().to_pybytes())
+    writer.add("commit", "[1,[0,0]]")
+    writer.commit()
+    writer.close()
+    with pytest.raises(ArtifactError, match=r"journal is damaged \(two tables have the name"):
+        open_run(directory).arrow("late")
 
 
 def test_one_run_has_one_writer(tmp_path):

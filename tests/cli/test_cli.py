@@ -177,6 +177,7 @@ def test_validate_says_what_would_run_and_writes_nothing(fleet2d):
         assert word in out
     assert ["home.yaml"] == [path.name for path in Path().iterdir()]
     assert 0 == fleet2d("validate", "bundled:paper")[0]
+    assert "can't get to storage_1" in fleet2d("validate", flat_path())[1]
 
 
 def test_a_home_in_which_something_will_not_work_runs_unless_strict(fleet2d):

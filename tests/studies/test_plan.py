@@ -201,6 +201,9 @@ def test_variants_without_a_metric_are_noted(tmp_path):
     assert not any("distance" in note for note in notes)
 
 
-def test_equal_seeds_are_refused():
+def test_equal_seeds_and_variants_with_the_same_scenario_are_refused():
     with pytest.raises(ScenarioError, match=r"variant 0 .* and variant 2 .* are the same scenario"):
         plan(replicates=[7, 8, 7])
+    axes = {SPEED: [0.3], "again": {"key": SPEED, "values": [0.4, 0.5], "when": {}}}
+    with pytest.raises(ScenarioError, match="are the same scenario"):
+        plan(axes=axes, rules=[{"set": {SPEED: 0.2}}])
