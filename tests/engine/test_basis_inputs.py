@@ -1,8 +1,6 @@
 """The files that a run depends on: what components read, and the modules of a user's own."""
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +25,7 @@ class Net(Model):
 """
 
 
-def content(folder: Path, **sections: Any) -> dict[str, Any]:
+def content(folder, **sections):
     (folder / "net.py").write_text(NET)
     np.save(folder / "weights.npy", np.ones(1))
     model = {"type": f"{folder.as_posix()}/net:Net", "weights": str(folder / "weights.npy")}

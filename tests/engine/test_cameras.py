@@ -2,27 +2,16 @@
 
 import copy
 import re
-from typing import Any
 
-import numpy as np
 import pytest
 from tests.scenes import OWN, everything, scenario
 
 import fleet2d
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.engine import loop
-from fleet2d.engine.cameras import NOTHING, Cameras
+from fleet2d.engine.cameras import NOTHING
 from fleet2d.engine.loop import PHASES, Span
 from fleet2d.errors import PlacementError
-from fleet2d.kernels import new_memory
-
-
-def test_a_robot_that_has_seen_nobody_remembers_nothing():
-    memory = new_memory(2, 3, 5)
-    assert [-1] * 4 == memory.noticed.tolist()
-    assert not memory.seen.any()
-    assert (2, 5) == memory.backlog.shape[:2]
-    assert not memory.waiting.any()
 
 
 class Glance:
@@ -30,18 +19,18 @@ class Glance:
 
     waits = True
 
-    def __init__(self, stops: int) -> None:
+    def __init__(self, stops):
         self.stops, self.next_step, self.looked = stops, 0, 0
 
-    def limit(self, bodies: object, end: int) -> int:
+    def limit(self, bodies, end):
         return min(end, self.next_step + self.stops)
 
-    def take(self, bodies: object, end: int) -> tuple[()]:
+    def take(self, bodies, end):
         self.looked += end - self.next_step
         self.next_step = end
         return ()
 
-    def interruptions(self, events: object) -> tuple[()]:
+    def interruptions(self, events):
         return ()
 
 
@@ -50,7 +39,7 @@ class Idle(Glance):
 
     waits = False
 
-    def limit(self, bodies: object, end: int) -> int:
+    def limit(self, bodies, end):
         raise AssertionError
 
 
@@ -68,14 +57,14 @@ def test_those_who_wait_have_looked_at_the_same_steps(stops):
     assert 0 == idle.looked
 
 
-def observed(cameras: Cameras) -> Any:
+def observed(cameras):
     """Return all that cameras carry along and have perceived."""
     sightings = SightingTable.joined(cameras._sightings or [NOTHING])
     memory = [array.tolist() for array in cameras.memory]
     return cameras.next_step, memory, cameras.perceived.tolist(), sightings.rows().tolist()
 
 
-def looks() -> dict[str, Any]:
+def looks():
     """Four robots with cameras of all kinds, which wait for what they see."""
     content = everything("1 h")
     for name, radius in (("curio", 0.15), ("drift", 0.1)):
@@ -102,8 +91,8 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
     """What a camera saw beyond the end of a span is as if it had never looked there."""
     simulation = fleet2d.Simulation({**looks(), "sight": {"method": {"type": method}}})
     state, beyond, ended = simulation._state, 0, 0
-    while simulation.step < 600:
-        span = Span(simulation.step, 600)
+    while simulation.step < 300:
+        span = Span(simulation.step, 300)
         for phase in PHASES[: PHASES.index(loop.watch)]:
             phase(state, span)
         ahead, whole = (copy.deepcopy(simulation)._state for _ in range(2))
@@ -122,7 +111,7 @@ def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(
                 assert observed(twin) == observed(cameras)
         for phase in PHASES[PHASES.index(loop.watch) + 1 :]:
             phase(state, span)
-    assert ended > 20
+    assert ended > 10
     assert beyond > 5
 
 
@@ -133,7 +122,7 @@ def test_every_draw_of_every_camera_has_a_stream_of_its_own():
     robot["perception"] = {"false_positives": {"per_hour": 1}, "attributes": {"activity": {}}}
     content["robots"]["curio"]["perception"] = robot["perception"]
     simulation = fleet2d.Simulation(content)
-    keys: list[int] = []
+    keys = []
     for cameras in simulation._state.cameras:
         errors = cameras.errors
         used = errors.keys if cameras.errs else errors.keys[..., :1]
@@ -143,26 +132,7 @@ def test_every_draw_of_every_camera_has_a_stream_of_its_own():
     assert len(set(keys)) == len(keys)
 
 
-def test_a_run_without_users_or_without_robots_has_no_cameras():
-    for content in (scenario(robots={"r": {}}), scenario(users={"ana": {"camera": {}}})):
-        state = fleet2d.Simulation(content)._state
-        assert not state.cameras
-        assert not state.user_cameras
-
-
-def test_users_with_cameras_look_at_robots_and_robots_at_users():
-    content = everything("1 min")
-    content["users"]["ben"]["camera"] = {"angle_deg": 180}
-    state = fleet2d.Simulation(content)._state
-    (gaze,) = state.user_cameras
-    assert ["ben", 1, 1] == [gaze.owner.name, gaze.row, gaze.index]
-    assert ["astro", "bolt", "curio", "drift", "ego"] == [actor.name for actor in gaze.others]
-    assert [(2, 0), (3, 1), (4, 2), (5, 3)] == [(c.row, c.index) for c in state.cameras]
-    assert all(["ana", "ben"] == [actor.name for actor in c.others] for c in state.cameras)
-    assert np.array_equal(gaze.counts, np.zeros((1, 5, 2)))
-
-
-def remarks(**robot: Any) -> list[str]:
+def remarks(**robot):
     """What is said of a robot's sight before the run."""
     content = scenario(users={"ana": "meander"}, robots={"astro": {"type": "meander", **robot}})
     return [note for note in fleet2d.Simulation(content).notes if "astro" in note]

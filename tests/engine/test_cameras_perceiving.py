@@ -8,10 +8,10 @@ from tests.scenes import digests, everything, run, scenario, table
 from tests.thorough import some
 
 import fleet2d
-from fleet2d import Algorithm, History, Metric, Present
+from fleet2d import Algorithm, Metric
 from fleet2d.errors import ComponentError, InputError, ScenarioError
 
-PERCEPTION: dict[str, Any] = {
+PERCEPTION = {
     "detection": {
         "distance": {"midpoint": 3, "width": 0.5, "top": 0.9},
         "bearing": [[0, 1], [60, 0.5]],
@@ -41,7 +41,7 @@ PERCEPTION: dict[str, Any] = {
         "activity": {"wash": {"read": 0.5}, "breakfast": {"unknown": 0.2}},
     },
 }
-CAMERAS: dict[str, Any] = {
+CAMERAS = {
     "front": {"angle_deg": 100, "offset": [0.1, 0.02], "body_points": 6, "latency": "2 s"},
     "rear": {"heading_deg": 180, "range": [0.2, 3], "period": "3 s", "perception": {}},
     "mast": {"pan": {"headings_deg": [-60, 0, 60], "dwell": "4 s"}, "latency": "1 s"},
@@ -53,7 +53,7 @@ class Peek(Algorithm):
 
     seen: ClassVar[list[Any]] = []
 
-    def update(self, history: History, state: Present) -> Any:
+    def update(self, history, state):
         for name in ("truth", "looks"):
             with pytest.raises(ComponentError, match=f"'{name}' is ground truth"):
                 getattr(history, name)
@@ -65,11 +65,11 @@ class Both(Metric):
 
     seen: ClassVar[list[Any]] = []
 
-    def update(self, history: History, state: Present) -> Any:
+    def update(self, history, state):
         self.seen.append((history.observations, history.truth, history.looks))
 
 
-def full(duration: str = "1 h", **changes: Any) -> dict[str, Any]:
+def full(duration="1 h", **changes):
     """Every behavior, and robots of which two err, one of them with three cameras."""
     content = everything(duration)
     robots = content["robots"]
@@ -99,13 +99,9 @@ def test_every_table_is_the_same_when_watchers_take_in_few_steps_at_once(whole, 
     assert digests(whole) == digests(run(full()))
 
 
-def test_a_run_that_errs_is_reproduced_from_its_manifest(tmp_path):
-    fleet2d.run(full("5 min"), out=tmp_path / "run")
-    assert fleet2d.reproduce(tmp_path / "run").same
-
-
 def test_rows_tell_false_from_true_and_who_from_whom(whole):
     rows = table(whole, "observations")
+    assert not any(room is None or room != room for room in rows["room"]), "also within walls"
     astro = rows["robot"] == "astro"
     assert {"front", "rear", "mast"} == set(rows["camera"][astro])
     assert {"camera"} == set(rows["camera"][~astro])
@@ -123,12 +119,6 @@ def test_rows_tell_false_from_true_and_who_from_whom(whole):
         assert (rows[column] == rows[f"true_{column}"])[sharp].all()
     off = np.hypot(rows["x"] - rows["true_x"], rows["y"] - rows["true_y"])[~sharp & ~false]
     assert 0.02 < np.median(off) < 0.3
-
-
-def test_every_observation_is_in_a_room():
-    """Noise carries some into walls; the nearest room counts there."""
-    rows = table(run(full()), "observations")
-    assert not any(room is None or room != room for room in rows["room"])
 
 
 def test_the_truth_is_where_users_were_when_they_were_looked_at():
@@ -219,7 +209,6 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing():
             {"perception": {"detection": {"distance": [[2, 1], [1, 0]]}}},
             ["distance", "must ascend"],
         ),
-        ({"perception": {"detection": {"distance": {"midpoint": 3}}}}, ["distance", "width"]),
         ({"perception": {"detection": {"distance": 1.2}}}, ["distance", "0 to 1"]),
         ({"perception": {"detection": {"light": [[-2, 1], [26, 0]]}}}, ["light", "-2", "0 to 24"]),
         ({"perception": {"detection": {"range": 3}}}, ["unknown key 'range'"]),
@@ -235,7 +224,6 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing():
         ({"perception": {"identity": {"right": 0.9, "mistaken": 0.2}}}, ["0.9", "more than 1"]),
         ({"perception": {"false_positives": {"looks_like": {"zoe": 1}}}}, ["'zoe'", "ana, ben"]),
         ({"perception": {"false_positives": {"per_hour": 4000}}}, ["4000 per hour", "3600"]),
-        ({"perception": {"attributes": {"posture": {"sit": {"sit": 1}}}}}, ["posture.sit"]),
         (
             {"perception": {"attributes": {"activity": {"cook": {"read": 0.6, "eat": 0.6}}}}},
             ["activity.cook", "1.2"],
@@ -256,12 +244,3 @@ def test_a_list_of_cameras_is_numbered():
         scenario(robots={"r": {"cameras": [{}, {"heading_deg": 180}]}})
     ).robots["r"]
     assert ["camera_00", "camera_01"] == list(robot.eyes)
-
-
-def test_a_behavior_can_wait_for_what_several_cameras_see():
-    content = everything("30 min")
-    robot = content["robots"]["bolt"]
-    robot["cameras"] = {"left": {"heading_deg": 60}, "right": {"heading_deg": -60}}
-    del robot["camera"]
-    events = table(run(content), "events", entity="bolt")
-    assert {"user_seen", "user_lost"} <= set(events["event"])

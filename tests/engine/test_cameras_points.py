@@ -1,7 +1,5 @@
 """Methods of sight in runs: the same run by each, whoever looks; and users who look themselves."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.scenes import TESTS, digests, everything, flat_path, run, scenario, table
@@ -13,7 +11,7 @@ from fleet2d._core import camera_pose
 from fleet2d.engine.cameras import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
 from fleet2d.floorplan.home import Home
-from fleet2d.kernels import U64, Bool, Lenses, PoseBlock, Poses, Reach
+from fleet2d.kernels import PoseBlock, Poses, Reach
 from fleet2d.sight import cached_fov
 from fleet2d.sight.cached_fov import Flashlight, VisibilityPolygon
 from fleet2d.sight.camera import Camera, TableContext, stack_lenses
@@ -25,7 +23,7 @@ ODD = {
     "range": [0.3, 5], "angle_deg": 140, "offset": [0.1, -0.04], "heading_deg": 30, "body_points": 6,
     "pan": {"headings_deg": [-60, 0, 60], "dwell": "7 s"},
 }  # fmt: skip
-METHODS: list[dict[str, Any]] = [
+METHODS = [
     {"type": "visibility_polygon"},
     {"type": "visibility_polygon", "keep": 2},
     {"type": "visibility_polygon", "precompute": "all"},
@@ -35,24 +33,24 @@ METHODS: list[dict[str, Any]] = [
 class XRay(FieldOfView):
     """A user's own method, for which walls don't count."""
 
-    def visible(self, home: Home, x: int, y: int, points: Any) -> Bool:
+    def visible(self, home, x, y, points):
         return np.ones(len(points), np.bool_)
 
 
 class Wrong(FieldOfView):
     """One that answers with numbers."""
 
-    def visible(self, home: Home, x: int, y: int, points: Any) -> Any:
+    def visible(self, home, x, y, points):
         return np.ones(len(points), np.int64)
 
-    def sees(self, home: Home, x: int, y: int, heading: int, reach: Reach, points: Any) -> Any:
+    def sees(self, home, x, y, heading, reach, points):
         return self.visible(home, x, y, points)
 
 
 class Broken(FieldOfView):
     """One that fails."""
 
-    def visible(self, home: Home, x: int, y: int, points: Any) -> Bool:
+    def visible(self, home, x, y, points):
         raise KeyError("glass")
 
 
@@ -61,21 +59,21 @@ class Shy(Behavior):
 
     records = frozenset({"shied"})
 
-    def decide(self, now: Any) -> Any:
+    def decide(self, now):
         for event in now.events:
             plan = now.plan().note("shied", f"{event.event} {event.user}").go_to("bedroom")
             return plan.stay().interrupt_on("robot_lost")
         return now.plan().stay().interrupt_on("robot_seen")
 
 
-def stored_without_scenario(content: dict[str, Any], **changes: Any) -> dict[str, str]:
+def stored_without_scenario(content, **changes):
     """Return the digests of a run's tables."""
     return {
         name: digest for name, digest in digests(run(content, **changes)).items() if name != "run"
     }
 
 
-def with_odd_cameras() -> dict[str, Any]:
+def with_odd_cameras():
     """The scenario with everything; two robots have odd cameras, one of them several."""
     content = everything("20 min")
     content["robots"]["curio"].pop("camera")
@@ -107,17 +105,6 @@ def test_run_by_flashlight_is_the_same_where_users_stand_at_centres_of_cells(mon
         monkeypatch.setattr(cached_fov, "MEMORY_BYTES", memory_bytes)
         method = {"type": "flashlight"}
         assert expected == stored_without_scenario({**content, "sight": {"method": method}})
-
-
-def test_run_by_flashlight_is_nearly_the_same_where_users_walk():
-    content = everything("20 min")
-    content["simulation"]["ghosts"] = True
-    exact = run(content)
-    by_cells = run({**content, "sight": {"method": {"type": "flashlight"}}})
-    seen = [len(table(one, "observations")["step"]) for one in (exact, by_cells)]
-
-    assert digests(exact)["observations"] != digests(by_cells)["observations"]
-    assert seen[0] == pytest.approx(seen[1], rel=0.1)
 
 
 @pytest.mark.slow
@@ -158,9 +145,7 @@ def test_own_method_that_fails_is_blamed(method, why):
 # --- The slow twin ---------------------------------------------------------------------------
 
 
-def seen_one_by_one(
-    method: FieldOfView, home: Home, lenses: Lenses, robot: Poses, crowd: PoseBlock, first: int
-) -> U64:
+def seen_one_by_one(method, home, lenses, robot, crowd, first):
     """Return what `points_seen` does, asking about every body in every step."""
     cameras, bodies = lenses.widest.shape
     seen = np.zeros((cameras, bodies, len(robot.x)), np.uint64)
@@ -182,7 +167,7 @@ def seen_one_by_one(
     return seen
 
 
-def wandering(rng: np.random.Generator, home: Home, bodies: int, steps: int) -> Any:
+def wandering(rng, home, bodies, steps):
     """Return poses (4, bodies, steps) of bodies that stand, walk, jump, and are away at times."""
     cells = home.plan.lattice.cell_centre(*np.argwhere(home.plan.free).T)
     spots = np.stack(cells)[:, rng.integers(0, len(cells[0]), (bodies, 6))]
@@ -218,7 +203,7 @@ def test_points_seen_are_those_of_asking_about_everybody_each_time(method, first
 # --- Users who look --------------------------------------------------------------------------
 
 
-def facing(**camera: Any) -> dict[str, Any]:
+def facing(**camera):
     """A user who looks along the living room, through which a robot goes to and fro."""
     user = {"start": [0.5, 3.5], "start_heading_deg": 0, "camera": {"range": [0, 9], **camera}}
     robot = {"type": "patrol", "waypoints": [[4.0, 3.5], [7.5, 0.5]], "dwell": "20 s"}
@@ -226,21 +211,10 @@ def facing(**camera: Any) -> dict[str, Any]:
     return scenario("10 min", users={"ana": user}, robots={"astro": {**robot, "camera": None}})
 
 
-def sights(stored: Any) -> list[tuple[int, str, str, str]]:
+def sights(stored):
     rows = stored.pandas("events")
     rows = rows[rows["event"].str.startswith("robot_")]
     return list(zip(rows["step"], rows["entity"], rows["event"], rows["detail"], strict=True))
-
-
-def test_user_with_a_camera_sees_robots_come_and_go():
-    result = sights(run(facing()))
-
-    assert len(result) > 8
-    assert {("ana", "astro")} == {(who, whom) for _, who, _, whom in result}
-    assert ["robot_seen", "robot_lost"] * 4 == [event for _, _, event, _ in result[:8]]
-    behind = facing()
-    behind["users"]["ana"]["start_heading_deg"] = 180
-    assert [] == sights(run(behind))
 
 
 def test_user_sees_a_robot_just_when_a_robot_like_the_user_would_see_a_user_like_it():
@@ -259,6 +233,8 @@ def test_user_sees_a_robot_just_when_a_robot_like_the_user_would_see_a_user_like
     result = sights(run({**content, "robots": {"astro": robot}}))
 
     assert expected == [(step, event) for step, _, event, _ in result]
+    assert len(result) > 8
+    assert {("ana", "astro")} == {(who, whom) for _, who, _, whom in result}
 
 
 def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show():
@@ -269,16 +245,6 @@ def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show():
 
     assert "robot_seen astro" == rows[rows["event"] == "shied"]["detail"].iloc[0]
     assert digests(stored) == digests(run(content, max_span=1))
-
-
-def test_users_who_look_change_nothing_else():
-    content = everything("20 min")
-    looking = everything("20 min")
-    looking["users"]["ben"]["camera"] = {"angle_deg": 180}
-    before, after = stored_without_scenario(content), stored_without_scenario(looking)
-
-    assert before.keys() == after.keys()
-    assert ["events"] == [name for name in before if before[name] != after[name]]
 
 
 def test_user_that_errs_is_refused():

@@ -1,7 +1,5 @@
 """Lights of rooms: switched by scripts and by people, and what a camera misses in the dark."""
 
-from typing import Any
-
 import pytest
 from tests.scenes import digests, run, scenario, table
 
@@ -13,7 +11,7 @@ CAMERA = {"range": [0.2, 6], "angle_deg": 360}
 NIGHT = {"start": "2026-01-05T22:00"}
 
 
-def watched(*script: dict[str, Any], ana: dict[str, Any] | None = None, **sections: Any) -> Any:
+def watched(*script, ana=None, **sections):
     """A run in which Ana sits in the kitchen, where a robot stands and sees her."""
     days = [{"items": [{"at": "00:00", "place": [6.5, 3.1], "activity": "read"}]}]
     return run(
@@ -28,14 +26,14 @@ def watched(*script: dict[str, Any], ana: dict[str, Any] | None = None, **sectio
     )
 
 
-def seen(stored: Any, first: str, last: str) -> int:
+def seen(stored, first, last):
     """Return at how many steps the robot saw Ana between two times after 22 o'clock."""
     steps = table(stored, "observations")["step"]
     begin, end = (60 * int(t[3:]) for t in (first, last))
     return int(((steps >= begin) & (steps < end)).sum())
 
 
-def switched(stored: Any, kind: str) -> tuple[list[int], list[str]]:
+def switched(stored, kind):
     """Return at which steps which rooms were switched."""
     rows = table(stored, "events", event=kind)
     return rows["step"].tolist(), rows["detail"].tolist()
@@ -53,20 +51,57 @@ def test_lights_off_people_in_the_room_are_noticed_a_fifth_as_often():
     assert (off, on) == (switched(stored, "light_off"), switched(stored, "light_on"))
 
 
-def test_lights_of_other_rooms_and_of_a_room_by_daylight_change_nothing():
-    off = {"at": "0 s", "lights": "all", "turn": "off"}
-    assert seen(watched({**off, "lights": "bedroom"}), "22:00", "22:20") == 1200
-    assert seen(watched(off, simulation={"start": "2026-01-05T12:00"}), "22:00", "22:20") == 1200
+def unlit(share):
+    """A robot that notices so large a share of those who are in the dark."""
+    return {"perception": {"detection": {"unlit": share}}}
 
 
-def test_how_much_a_camera_misses_in_the_dark_is_its_own():
-    off = {"at": "0 s", "lights": "kitchen", "turn": "off"}
-    blind = {"perception": {"detection": {"unlit": 0.0}}}
-    assert seen(watched(off, astro=blind), "22:00", "22:20") == 0
-    assert (
-        seen(watched(off, astro={"perception": {"detection": {"unlit": 1.0}}}), "22:00", "22:20")
-        == 1200
-    )
+def evening(day, time="19:00"):
+    """Dark in December and light in June; the default of `unlit` says dark."""
+    return {"start": f"2026-{day}T{time}", "daylight": {"latitude": 52.52, "noon": "12:06:23"}}
+
+
+@pytest.mark.parametrize(
+    ("rooms", "simulation", "astro", "least", "most"),
+    [
+        ("bedroom", {}, {}, 1200, 1200),
+        ("all", {"start": "2026-01-05T12:00"}, {}, 1200, 1200),
+        ("all", {}, unlit(0.0), 0, 0),
+        ("all", {}, unlit(1.0), 1200, 1200),
+        ("all", evening("06-21"), {}, 1200, 1200),
+        ("all", evening("12-21"), {}, 150, 330),
+        ("all", evening("12-21"), unlit(0.0), 0, 0),
+    ],
+    ids=[
+        "elsewhere",
+        "by day",
+        "blind in the dark",
+        "as good in the dark",
+        "in summer",
+        "in winter",
+        "a curve of its own goes before daylight",
+    ],
+)
+def test_how_many_of_1200_looks_notice_ana_in_a_room_without_light(
+    rooms, simulation, astro, least, most
+):
+    off = {"at": "0 s", "lights": rooms, "turn": "off"}
+    stored = watched(off, simulation=simulation, astro=astro)
+
+    assert least <= seen(stored, "22:00", "22:20") <= most
+
+
+@pytest.mark.parametrize(
+    ("day", "time", "expected"),
+    [("06-21", "19:00", []), ("12-21", "19:00", [1]), ("12-21", "15:50", range(180, 300))],
+    ids=["light", "dark", "sunset is at 15:54"],
+)
+def test_lights_in_the_dark_are_on_from_sunset_to_sunrise(day, time, expected):
+    stored = watched(ana={"lights": "dark"}, simulation=evening(day, time))
+    steps, _ = switched(stored, "light_on")
+
+    assert len(steps) == bool(expected)
+    assert all(step in expected for step in steps)
 
 
 DAY = [
@@ -76,7 +111,7 @@ DAY = [
 ]
 
 
-def people(**simulation: Any) -> dict[str, Any]:
+def people(**simulation):
     """An evening of Ana, who switches lights, and Ben, who is in the kitchen from 22:06 on."""
     ben = [{"at": "21:00", "place": "living_room"}, {"at": "22:06", "place": "kitchen"}]
     user = {"type": "schedule", "lights": "18:00-23:30"}
@@ -135,12 +170,16 @@ def test_lights_are_switched_by_hand_and_a_note_says_where_events_are_not_stored
 
 
 def test_lights_are_the_same_for_every_span_and_after_resuming(tmp_path):
-    whole = digests(run(people()))
-    assert whole == digests(run(people(max_span=7)))
-    simulation = fleet2d.Simulation(people())
+    content = people(daylight={"latitude": 52.5})
+    content["users"]["ana"]["lights"] = "dark"
+    whole = digests(run(content))
+    assert whole == digests(run(content, max_span=7))
+    simulation = fleet2d.Simulation(content)
     simulation.run_until("22:07")
     simulation.save(tmp_path / "half")
     assert whole == digests(fleet2d.Simulation.load(tmp_path / "half").run())
+    resolved = fleet2d.load_scenario(fleet2d.load_scenario(content).resolved())
+    assert fleet2d.load_scenario(content).users["ana"].lights == resolved.users["ana"].lights
 
 
 def test_light_of_a_room_or_kind_is_an_expectation():
@@ -157,68 +196,15 @@ def test_light_of_a_room_or_kind_is_an_expectation():
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("script", "ana", "message"),
     [
-        ({"lights": "kitchn", "turn": "off"}, "no room 'kitchn': did you mean 'kitchen'"),
-        ({"lights": "kitchen"}, "turn"),
-        ({"lights": "kitchen", "turn": "dim"}, "turn"),
+        ([{"lights": "kitchn", "turn": "off"}], {}, "no room 'kitchn': did you mean 'kitchen'"),
+        ([{"lights": "kitchen"}], {}, "turn"),
+        ([{"lights": "kitchen", "turn": "dim"}], {}, "turn"),
+        ([], {"lights": "dark"}, r"lights.*simulation\.daylight"),
+        ([], {"lights": "darkness"}, r"lights.*17:00-08:00', or dark"),
     ],
 )
-def test_unknown_rooms_and_turns_are_refused(change, message):
+def test_unknown_rooms_turns_and_hours_are_refused(script, ana, message):
     with pytest.raises(InputError, match=message):
-        watched({"at": "22:05", **change})
-
-
-DARK_AT = "19:00"
-"""Dark in December and light in June; the default of `unlit` says dark."""
-
-
-@pytest.mark.parametrize(("start", "least", "most"), [("06-21", 1200, 1200), ("12-21", 150, 330)])
-def test_with_daylight_the_season_decides_how_dark_an_unlit_room_is(start, least, most):
-    off = {"at": "0 s", "lights": "all", "turn": "off"}
-    place = {"start": f"2026-{start}T{DARK_AT}", "daylight": {"latitude": 52.5}}
-    stored = watched(off, simulation=place)
-
-    assert least <= seen(stored, "22:00", "22:20") <= most
-
-
-def test_a_curve_of_ones_own_goes_before_daylight():
-    off = {"at": "0 s", "lights": "all", "turn": "off"}
-    place = {"start": f"2026-12-21T{DARK_AT}", "daylight": {"latitude": 52.5}}
-    blind = {"perception": {"detection": {"unlit": 0.0}}}
-
-    assert seen(watched(off, simulation=place, astro=blind), "22:00", "22:20") == 0
-
-
-@pytest.mark.parametrize(("day", "expected"), [("06-21", []), ("12-21", [1])])
-def test_lights_in_the_dark_are_on_from_sunset_to_sunrise(day, expected):
-    place = {"start": f"2026-{day}T{DARK_AT}", "daylight": {"latitude": 52.5}}
-
-    assert expected == switched(watched(ana={"lights": "dark"}, simulation=place), "light_on")[0]
-
-
-def test_a_light_goes_on_at_sunset():
-    """In Berlin's winter, at 15:54 and some seconds."""
-    place = {"start": "2026-12-21T15:50", "daylight": {"latitude": 52.52, "noon": "12:06:23"}}
-    steps, rooms = switched(watched(ana={"lights": "dark"}, simulation=place), "light_on")
-
-    assert (["kitchen_1"], True) == (rooms, 180 < steps[0] < 300)
-
-
-def test_lights_in_the_dark_need_a_place():
-    with pytest.raises(InputError, match=r"lights.*simulation\.daylight"):
-        watched(ana={"lights": "dark"})
-    with pytest.raises(InputError, match=r"lights.*17:00-08:00', or dark"):
-        watched(ana={"lights": "darkness"})
-
-
-def test_runs_by_daylight_are_the_same_for_every_span_and_from_their_manifest():
-    content = people(daylight={"latitude": 52.5})
-    content["users"]["ana"]["lights"] = "dark"
-    expected = digests(run(content))
-
-    assert expected == digests(run(content, max_span=7))
-    assert (
-        fleet2d.load_scenario(fleet2d.load_scenario(content).resolved()).users["ana"].lights
-        == fleet2d.load_scenario(content).users["ana"].lights
-    )
+        watched(*({"at": "22:05", **change} for change in script), ana=ana)

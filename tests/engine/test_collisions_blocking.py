@@ -1,8 +1,6 @@
 """Bodies in each other's way: they wait, go round, squeeze past; the same for every span."""
 
 import copy
-from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,22 +14,22 @@ BLOCK = {"people_block": "3 s"}
 WALK = {"type": "tests.own_components:Scripted", "speed": 1.0}
 
 
-def walker(start: list[float], *script: Any, **more: Any) -> dict[str, Any]:
+def walker(start, *script, **more):
     """Somebody who follows a script."""
     return {**WALK, "start": start, "start_heading_deg": 0, "script": list(script), **more}
 
 
-def home(duration: str = "1 min", block: Any = BLOCK, **sections: Any) -> dict[str, Any]:
+def home(duration="1 min", block=BLOCK, **sections):
     """The flat, in which bodies block each other's way."""
     return scenario(duration, simulation={**block}, **sections)
 
 
-def gap(stored: Any, one: str = "ana", other: str = "ben") -> Any:
+def gap(stored, one="ana", other="ben"):
     a, b = path(stored, one), path(stored, other)
     return np.hypot(a.x - b.x, a.y - b.y)
 
 
-def gives_way(stored: Any) -> list[tuple[int, str, str]]:
+def gives_way(stored):
     rows = stored.pandas("events")
     rows = rows[rows["event"] == "gives_way"]
     return list(zip(rows["step"], rows["entity"], rows["detail"], strict=True))
@@ -47,14 +45,6 @@ def test_somebody_waits_before_a_body_and_then_goes_round_it():
     assert (4, 3) == pytest.approx((ana.x[-1], ana.y[-1]), abs=1e-3)
     stands = np.flatnonzero(np.diff(ana.x) == 0)
     assert 3 == len(stands[ana.x[stands] < 2.5])
-
-
-def test_without_it_bodies_are_air():
-    users = {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [3, 3]}}
-    stored = run(home(block={}, users=users))
-
-    assert [] == gives_way(stored)
-    assert gap(stored).min() == 0
 
 
 def test_somebody_who_is_gone_in_time_is_only_waited_for():
@@ -119,39 +109,13 @@ def test_what_was_to_come_later_comes_in_time_after_a_rest():
     assert (path(stored, "ana").y[20:] == alone.y[20:]).all()
 
 
-def test_robots_wait_for_each_other_and_for_people():
-    robots = {
-        "astro": walker([1, 3], [4, 3], 60.0, radius=0.15),
-        "bolt": {"start": [2.5, 3], "start_heading_deg": 0},
-    }
-    stored = assert_same_for_every_max_span(
-        home(robots=robots, users={"ana": {"start": [3.2, 3]}}), 7
-    )
-
-    assert "astro" in {row[1] for row in gives_way(stored)}
-    assert gap(stored, "astro", "bolt").min() >= 0.3
-    assert gap(stored, "bolt", "ana").min() >= 0.35
-    assert gap(stored, "astro", "ana").min() >= 0.35
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("span", some([1, 61], 2))
+@pytest.mark.parametrize("span", some([7, 1, 61], 3))
 def test_spans_do_not_show_where_bodies_block_each_other(span):
-    content = everything("40 min")
+    content = everything("20 min")
     content["simulation"] |= BLOCK
 
     assert digests(run(content)) == digests(run(content, max_span=span))
-
-
-def test_in_a_crowd_bodies_overlap_less_often():
-    users = {name: {"type": "meander", "speed": 0.7} for name in ("ana", "ben", "cleo", "dora")}
-    blocked, free = (run(home("40 min", block, users=users)) for block in (BLOCK, {}))
-    seconds = [
-        sum(int((gap(stored, *pair) < 0.4).sum()) for pair in combinations(users, 2))
-        for stored in (blocked, free)
-    ]
-
-    assert seconds[0] * 5 < seconds[1]
 
 
 def test_a_family_lives_its_day():

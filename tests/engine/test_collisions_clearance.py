@@ -1,7 +1,5 @@
 """Giving way: robots stop before people, wait, go round; the same for every span."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.entities.robots.robots import (
@@ -13,7 +11,7 @@ from tests.entities.robots.robots import (
     rooms,
 )
 from tests.entities.robots.test_find import belief
-from tests.scenes import digests, each_step, everything, path, run
+from tests.scenes import digests, path, run
 
 import fleet2d
 from fleet2d.errors import InputError
@@ -28,19 +26,17 @@ TO_AND_FRO = {
 KEPT = 0.2 + 0.15 + 0.4
 
 
-def stands(x: float, y: float) -> dict[str, Any]:
+def stands(x, y):
     return {"type": "schedule", "days": [{"items": [{"at": "00:00", "place": [x, y]}]}]}
 
 
-def polite(
-    ana: Any, behaviors: list[Any] | None = None, duration: str = "10 min", **fields: Any
-) -> dict[str, Any]:
+def polite(ana, behaviors=None, duration="10 min", **fields):
     return home_with(
         behaviors or [TO_AND_FRO], duration, ana, astro={"gives_way": {**GIVES_WAY, **fields}}
     )
 
 
-def gap(stored: Any) -> Any:
+def gap(stored):
     one, other = path(stored, "astro"), path(stored, "ana")
     return np.hypot(one.x - other.x, one.y - other.y)
 
@@ -54,34 +50,10 @@ def test_it_waits_before_somebody_and_then_goes_round():
     assert astro.x[400:].min() < 1.1
 
 
-def test_without_it_the_robot_drives_through_people():
-    assert gap(run(home_with([TO_AND_FRO], "10 min", stands(3.0, 3.5)))).min() < 0.35
-
-
 def test_it_comes_no_nearer_while_it_is_patient():
     stored = run(polite(stands(2.8, 3.5), patience="1 h"))
     assert gap(stored).min() >= KEPT - 0.01
     assert 1 == names(stored).count("gives_way")
-
-
-def test_it_lets_somebody_through_a_door_and_goes_on_with_its_round():
-    walker = {
-        "type": "tests.own_components:Scripted",
-        "start": [7.0, 3.1],
-        "speed": 0.6,
-        "script": [12.0, [1.0, 0.6], 600.0],
-    }
-    patrol = {
-        "type": "patrol",
-        "waypoints": [[6.5, 3.1], [6.5, 1.0]],
-        "dwell": "30 s",
-        "look_around": False,
-    }
-    content = polite(walker, [patrol], "4 min", patience="30 s")
-    content["robots"]["astro"]["start"] = [2.0, 3.1]
-    stored = assert_same_for_every_max_span(content, 61, 1)
-    assert "gives_way" in names(stored)
-    assert "kitchen_1" in rooms(stored, 25)
 
 
 def test_steps_of_any_length_and_copies_give_the_same():
@@ -97,7 +69,7 @@ def test_steps_of_any_length_and_copies_give_the_same():
     assert digests(copy.deepcopy(simulation).run()) == digests(simulation.run())
 
 
-def own_approaches(stored: Any, user: str = "ana") -> Any:
+def own_approaches(stored, user="ana"):
     """How near the robot's own moves bring it to where somebody was, of those that bring it nearer [m]."""
     one, other = path(stored, "astro"), path(stored, user)
     before = np.hypot(one.x[:-1] - other.x[:-1], one.y[:-1] - other.y[:-1])
@@ -111,21 +83,20 @@ def own_approaches(stored: Any, user: str = "ana") -> Any:
     ids=["meander", "patrol", "opportunistic", "follow"],
 )
 def test_it_never_drives_into_anybody_in_a_crowd(behaviors):
-    content = polite("meander", behaviors, "40 min")
-    stored = assert_same_for_every_max_span(content, 61)
+    stored = assert_same_for_every_max_span(polite("meander", behaviors, "20 min"), 61)
     assert "gives_way" in names(stored)
     assert own_approaches(stored).min() >= 0.35
-    rude = run(home_with(behaviors, "40 min", "meander"))
+    rude = run(home_with(behaviors, "20 min", "meander"))
     assert own_approaches(rude).min() < 0.35
 
 
-def test_it_never_drives_into_anybody_for_days_in_a_furnished_home():
+def test_it_never_drives_into_anybody_in_a_furnished_home():
     member = {
         "type": "routine",
         "household": {"members": {"ana": "works_from_home", "ben": "retired"}},
     }
     content = {
-        "simulation": {"start": "2026-01-05", "duration": "3 d", "seed": 4},
+        "simulation": {"start": "2026-01-05", "duration": "1 d", "seed": 4},
         "floorplan": {"type": "bundled", "furnish": True},
         "users": {"ana": member, "ben": member},
         "robots": {"astro": {"behaviors": [{"type": "patrol", "dwell": "1 min"}], "gives_way": {}}},
@@ -134,10 +105,7 @@ def test_it_never_drives_into_anybody_for_days_in_a_furnished_home():
     nearest = [own_approaches(stored, user) for user in ("ana", "ben")]
     assert min(result.min() for result in nearest) >= 0.35
     # Nearer than it likes it comes only where it has waited, and there is no more room.
-    assert sum(int((result < KEPT - 0.01).sum()) for result in nearest) < 60
-    content["simulation"]["ghosts"] = True
-    rude = run({**content, "robots": {"astro": {"type": "patrol", "dwell": "1 min"}}})
-    assert sum(int((own_approaches(rude, user) < 0.35).sum()) for user in ("ana", "ben")) > 10
+    assert sum(int((result < KEPT - 0.01).sum()) for result in nearest) < 20
 
 
 IN_THE_DOOR = {"type": "tests.own_components:Scripted", "start": [5.05, 3.1], "speed": 1.0}
@@ -181,16 +149,10 @@ def test_a_look_that_was_held_up_counts_as_one():
     assert {"kitchen_1", "bedroom_1", "bathroom_1"} <= visited(result)
 
 
-def visited(stored: Any) -> set[str]:
+def visited(stored):
     """The rooms that the robot was in."""
     poses = path(stored, "astro")
     return {stored.plan.rooms[room].name for room in set(poses.room.tolist()) if room >= 0}
-
-
-def test_key_frames_tell_the_same_as_the_poses():
-    content = polite("meander", ["patrol"], "20 min")
-    poses, rows = path(run(content), "astro"), each_step(content, "astro")
-    assert np.abs(poses.x - rows["x"]).max() < 1e-3
 
 
 def test_events_at_the_begin_of_a_plan_are_told_though_it_waits():
@@ -201,16 +163,6 @@ def test_events_at_the_begin_of_a_plan_are_told_though_it_waits():
     content["users"]["ben"] = OUT
     stored = assert_same_for_every_max_span(content, 61)
     assert ["find_begins", "gave_up"] == [n for n in names(stored) if n != "gives_way"]
-
-
-def test_robots_that_do_not_give_way_are_as_they_were():
-    content = everything("20 min")
-    content["simulation"]["ghosts"] = True
-    before = run(content)
-    content["robots"]["zed"] = {"type": "patrol", "gives_way": {}, "camera": None}
-    after = run(content)
-    for name in ("astro", "bolt", "curio", "drift", "ana", "ben"):
-        assert np.array_equal(path(before, name).x, path(after, name).x), name
 
 
 @pytest.mark.parametrize(

@@ -3,18 +3,14 @@
 import copy
 import json
 from datetime import timedelta
-from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 import shapely
-from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
+from tests.scenes import TESTS, digests, flat_document, path, run, scenario
 
-from fleet2d import Algorithm, Behavior, History, Home, Present
+from fleet2d import Algorithm, Behavior
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import InputError
-from fleet2d.kernels import Bool
 from fleet2d.runs.layers import read_layer
 
 HERE = f"{TESTS.as_posix()}/engine/test_costs"
@@ -25,17 +21,17 @@ TOUR = {"type": "patrol", "waypoints": [[1.0, 3.0], [7.0, 3.0]], "dwell": "5 s"}
 class Bar(Algorithm):
     """Shuts the kitchen to robots from its first update on, and opens it at its fourth."""
 
-    def start(self, home: Home) -> None:
+    def start(self, home):
         self.costs = home.layers["costmap"]
         self.kitchen = home.plan.room_of_cell == home.plan.room("kitchen_1").index
         self.updates = 0
 
-    def update(self, history: History, state: Present) -> None:
+    def update(self, history, state):
         self.updates += 1
         self.costs.values[self.kitchen] = 0 if self.updates >= 4 else -1
 
 
-def flat_with_a_rug(folder: Path, costmap: Any, **more: Any) -> dict[str, Any]:
+def flat_with_a_rug(folder, costmap, **more):
     document = flat_document()
     document["no_go"] = [[list(c) for c in RUG.exterior.coords[:-1]]]
     (folder / "rug.json").write_text(json.dumps(document))
@@ -45,10 +41,9 @@ def flat_with_a_rug(folder: Path, costmap: Any, **more: Any) -> dict[str, Any]:
     return {**content, **more}
 
 
-def on_the_rug(stored: Any, name: str = "astro", margin: float = 0.0) -> Bool:
+def on_the_rug(stored, name="astro", margin=0.0):
     poses = path(stored, name)
-    inside: Bool = shapely.contains_xy(RUG.buffer(margin), poses.x, poses.y)
-    return inside
+    return shapely.contains_xy(RUG.buffer(margin), poses.x, poses.y)
 
 
 def test_robot_crosses_a_no_go_area_only_without_a_costmap(tmp_path):
@@ -71,13 +66,6 @@ def test_spots_that_are_drawn_in_a_room_are_never_where_no_way_leads(tmp_path):
     stored = run(content)
     assert not on_the_rug(stored).any()
     assert not on_the_rug(stored, "bolt").any()
-
-
-def test_users_walk_where_robots_may_not(tmp_path):
-    user = {"type": f"{HERE}:Hop", "start": [1, 3]}
-    content = flat_with_a_rug(tmp_path, {}, users={"ana": user}, robots={})
-
-    assert on_the_rug(run(content), "ana").any()
 
 
 @pytest.mark.slow
@@ -125,17 +113,6 @@ def test_costmap_is_stored_when_the_scenario_asks_for_it(tmp_path):
     assert 150 < costs[stored.plan.free].max() <= 200
 
 
-def test_run_without_a_costmap_is_the_run_before():
-    content = everything("10 min")
-    costed = copy.deepcopy(content)
-    costed["floorplan"]["costmap"] = {"clearance": 0, "wall_cost": 0, "no_go": "ignore"}
-    before, after = run(content), run(costed)
-    xs = [path(stored, "ana").x for stored in (before, after)]
-
-    assert np.array_equal(*xs)  # users don't mind, and spots are drawn from the same streams
-    assert not np.array_equal(path(before, "astro").x, path(after, "astro").x)  # on a grid of cells
-
-
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -161,5 +138,5 @@ def test_costmap_that_leaves_no_place_is_an_error(tmp_path):
 class Hop(Behavior):
     """From spot to spot in any room."""
 
-    def decide(self, now: Any) -> Any:
+    def decide(self, now):
         return now.plan().go_to("any", "hop").stay(timedelta(seconds=2))

@@ -1,17 +1,13 @@
 """Algorithms and metrics that events update: at which steps, with which history, in any spans."""
 
-import copy
-from collections.abc import Mapping
 from datetime import timedelta
-from typing import Any
 
 import numpy as np
 import pytest
 from tests.scenes import digests, everything, run, table
 from tests.thorough import some
 
-import fleet2d
-from fleet2d import Algorithm, Behavior, History, Home, Metric, Plan, Present, Situation
+from fleet2d import Algorithm, Behavior, Metric
 
 SENSORS = {
     "hall": {"type": "motion_sensor", "at": [2.5, 2.5], "range": 4},
@@ -22,7 +18,7 @@ SENSORS = {
 class Heard(Algorithm):
     """Notes what it was handed, and what happened at its last step."""
 
-    def update(self, history: History, state: Present) -> Mapping[str, Any]:
+    def update(self, history, state):
         now = sorted({event.event for event in history.events if event.step == state.step})
         return {
             "first": history.first,
@@ -36,13 +32,13 @@ class Heard(Algorithm):
 class HeardMetric(Metric):
     """The same, as a metric."""
 
-    def start(self, home: Home) -> None:
-        self.steps: list[int] = []
+    def start(self, home):
+        self.steps = []
 
-    def update(self, history: History, state: Present) -> None:
+    def update(self, history, state):
         self.steps.append(state.step)
 
-    def result(self) -> dict[str, Any]:
+    def result(self):
         return {"steps": self.steps}
 
 
@@ -51,20 +47,20 @@ class Watch(Behavior):
 
     records = frozenset({"knows"})
 
-    def decide(self, now: Situation) -> Plan:
+    def decide(self, now):
         told = now.outputs.get("heard")
         plan = now.plan().note("knows", str(told["end"] if told else 0))
         return plan.stay(timedelta(seconds=1))
 
 
-def content(duration: str = "30 min", **sections: Any) -> dict[str, Any]:
+def content(duration="30 min", **sections):
     found = everything(duration)
     for section, entries in sections.items():
         found[section] = {**found.get(section, {}), **entries}
     return found
 
 
-def heard(*names: str) -> dict[str, Any]:
+def heard(*names):
     return {"type": f"{__name__}:Heard", "on": list(names)}
 
 
@@ -78,7 +74,7 @@ ALL = {
 METRICS = {"diary": {"type": f"{__name__}:HeardMetric", "on": ["activity", "obeys"]}}
 
 
-def whole_run(**simulation: Any) -> Any:
+def whole_run(**simulation):
     return run(content(algorithms=ALL, metrics=METRICS, objects=SENSORS), **simulation)
 
 
@@ -87,7 +83,7 @@ def whole():
     return whole_run()
 
 
-def steps_of(stored: Any, events: set[str], who: tuple[str, ...]) -> list[int]:
+def steps_of(stored, events, who):
     rows = table(stored, "events")
     mine = np.isin(rows["event"], list(events)) & np.isin(rows["entity"], list(who))
     return np.unique(rows["step"][mine]).tolist()
@@ -135,28 +131,11 @@ def test_metrics_hear_of_users_and_get_the_rest_at_the_end(whole):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("span", some([1, 7, 600], 2))
+@pytest.mark.parametrize("span", some([7, 1, 600], 3))
 def test_events_are_the_same_for_every_max_span(whole, span):
     other = whole_run(max_span=span)
     assert digests(whole) == digests(other)
     assert whole.metrics == other.metrics
-
-
-def test_who_waits_for_events_changes_nothing_else(whole):
-    without = digests(run(content(objects=SENSORS)))
-    with_them = digests(whole)
-    for name, digest in without.items():
-        if name != "run":
-            assert digest == with_them[name], name
-
-
-@pytest.mark.slow
-def test_a_copy_goes_on_hearing(whole):
-    simulation = fleet2d.Simulation(content(algorithms=ALL, metrics=METRICS, objects=SENSORS))
-    simulation.advance(877)
-    twin = copy.deepcopy(simulation)
-    simulation.advance(100)
-    assert digests(whole) == digests(twin.run()) == digests(simulation.run())
 
 
 def test_a_behavior_reads_the_output_from_the_next_step_on():
@@ -173,8 +152,3 @@ def test_a_behavior_reads_the_output_from_the_next_step_on():
     for step, told in zip(rows["step"].tolist(), rows["detail"].tolist(), strict=True):
         before = made[made < step]
         assert str(before[-1] + 1 if len(before) else 0) == told
-
-
-def test_a_period_beside_events_is_not_minded():
-    odd = {"heard": {**heard("user_seen"), "period": "1.5 s"}}
-    assert len(table(run(content("20 min", algorithms=odd)), "heard")["step"])

@@ -1,27 +1,17 @@
 """Heights of cameras, bodies and furniture: in runs, for every span and by every exact method."""
 
-from typing import Any
-
-import numpy as np
 import pytest
-import shapely
 from tests.engine.test_cameras_hiding import WALK, seen
 from tests.scenes import digests, run, scenario
 from tests.thorough import some
 
 import fleet2d
-from fleet2d.engine.heights import prisms_of
-from fleet2d.floorplan.furniture import stand_furniture
-from fleet2d.floorplan.home import Home
-from fleet2d.kernels import QUARTER
 
 LIES = {"hold": "ana", "posture": "lie", "duration": "1 h", "at": "0 s"}
 ALL = [*range(10)]
 
 
-def behind(
-    piece: dict[str, Any] | None, camera_m: float = 0.4, *, x: float = 4.0, **ana: Any
-) -> dict[str, Any]:
+def behind(piece, camera_m=0.4, *, x=4.0, **ana):
     """A robot at the west end of the living room, ana at x, and furniture at 2.6 m between them."""
     users = {"ana": {"start": [x, 3.2], **ana}}
     camera = {"height": camera_m, "range": [0, 6]}
@@ -52,11 +42,6 @@ HIDDEN_BELOW_M = 0.4 + (0.85 - 0.4) * 3.4 / 1.55
 @pytest.mark.parametrize(("above_m", "expected"), [(0.005, {"ana": ALL}), (-0.005, {})])
 def test_a_head_is_seen_from_the_height_on_at_which_the_line_clears_the_sofa(above_m, expected):
     assert expected == seen(behind(SOFA, height=(HIDDEN_BELOW_M + above_m) * 16 / 15))
-
-
-@pytest.mark.parametrize(("camera_m", "expected"), [(2.5, {"ana": ALL}), (1.0, {})])
-def test_a_high_camera_looks_over_furniture_that_hides_from_a_low_one(camera_m, expected):
-    assert expected == seen(behind(SOFA, camera_m, x=4.7, height=0.3))
 
 
 @pytest.mark.parametrize(("height_cm", "expected"), [(80, {}), (15, {"ana": ALL})])
@@ -124,7 +109,7 @@ def test_a_pet_is_low_and_a_height_of_its_own_counts():
         assert ("ana" in seen(content)) == is_seen
 
 
-def walkers() -> dict[str, Any]:
+def walkers():
     """People who walk, sit and lie among furniture, and a robot with two cameras."""
     content = behind(SOFA)
     content["simulation"]["duration"] = "10 min"
@@ -159,24 +144,6 @@ def test_heights_are_the_same_by_every_exact_method_and_change_what_is_seen():
 
     assert expected["observations"] == result["observations"]
     assert expected["observations"] != digests(run({**content, "sight": {}}))["observations"]
-
-
-def test_the_back_of_a_sofa_is_high_and_its_seat_low():
-    plan = fleet2d.load_floorplan()
-    home = Home(plan)
-    units = plan.lattice.units_per_m
-    for heading in range(0, 4 * QUARTER, 300):
-        sofa = stand_furniture("sofa", (13.0, 3.0), heading, (2.0, 0.9))
-        (seat, seat_m), (back, back_m) = prisms_of(home, sofa)
-        whole, rear = shapely.Polygon(seat), shapely.Polygon(back)
-
-        assert (0.45, 0.85) == (seat_m, back_m)
-        assert abs(rear.area / units**2 - 2.0 * 0.25) < 0.02
-        assert shapely.area(shapely.difference(rear, whole.buffer(2))) == 0
-        ahead = np.array([np.cos(sofa.heading), np.sin(sofa.heading)])
-        middle = shapely.get_coordinates(rear.centroid)[0] / units - np.array([13.0, 3.0])
-        origin = plan.lattice.to_lattice((13.0, 3.0)) / units - np.array([13.0, 3.0])
-        assert abs((middle - origin) @ ahead + 0.325) < 0.02
 
 
 def test_a_height_of_what_blocks_sight_is_refused():

@@ -1,7 +1,5 @@
 """What has no effect in a run: behaviors without a turn, requests never made, events that never come."""
 
-from typing import Any
-
 import pytest
 from tests.scenes import AGENDA, scenario
 
@@ -12,14 +10,14 @@ CAMERA = {"range": [0.2, 4], "angle_deg": 120}
 PATROL = {"type": "patrol", "dwell": "10 s"}
 
 
-def home(*behaviors: Any, **sections: Any) -> dict[str, Any]:
+def home(*behaviors, **sections):
     """Ana and astro, a robot with some behaviors, a battery and a camera."""
     astro = {"behaviors": list(behaviors), "battery": BATTERY, "camera": CAMERA}
     users = {"ana": {"type": "schedule", "days": AGENDA}}
     return scenario("10 min", users=users, robots={"astro": astro}, **sections)
 
 
-def notes(document: dict[str, Any]) -> list[str]:
+def notes(document):
     """Return the notes of a run about astro and the script, up to its end."""
     found = fleet2d.run(document).manifest["notes"]
     return [note for note in found if note.startswith(("robots.astro:", "script"))]
@@ -54,17 +52,6 @@ def test_behaviors_that_all_get_a_turn_are_not_noted(behaviors):
     assert notes(home(*behaviors)) == []
 
 
-def test_reactions_of_a_person_after_her_days_are_noted():
-    days = {"type": "schedule", "days": AGENDA}
-    users = {"ana": {"behaviors": [days, {"type": "reactions"}]}}
-    simulation = fleet2d.Simulation(home(PATROL) | {"users": users})
-
-    assert [note for note in simulation.notes if note.startswith("users.ana:")] == [
-        "users.ana: reactions never gets a turn, as schedule before always has a plan: put schedule"
-        " last, or give it hours (when) or a cooldown"
-    ]
-
-
 def test_a_behavior_whose_turn_comes_as_the_script_switches_one_off_is_not_noted():
     script = [{"at": "07:02", "switch_off": "astro", "behavior": "patrol"}]
 
@@ -94,7 +81,7 @@ def test_an_entry_of_the_script_whose_event_never_comes_is_noted_at_the_end():
     assert notes(document) == ["script.1: replan was never applied: no came_home ana came"]
 
 
-def family(*members: str, **users: Any) -> list[str]:
+def family(*members, **users):
     """Return what notes say of households: of ana, and of more users."""
     household = {"members": dict.fromkeys(members, "works_outside")}
     everybody = {"ana": {"type": "routine", "household": household}} | users

@@ -1,20 +1,18 @@
 """The phases of a span: in which order what happens at a step, and when a span ends."""
 
-from collections.abc import Iterator
 from datetime import timedelta
-from typing import Any
 
 import pytest
 from tests.scenes import digests, everything, run, scenario
 
 import fleet2d
-from fleet2d import Algorithm, Behavior, Metric, Plan, Situation
+from fleet2d import Algorithm, Behavior, Metric
 from fleet2d.engine import loop
 from fleet2d.engine.loop import PHASES, Span
 from fleet2d.entities.body import NEVER
 from fleet2d.interventions import Replan, ShutDoor
 
-STORY: list[tuple[int, str]] = []
+STORY = []
 """What happened, as it happened: the step, and to whom."""
 
 
@@ -23,7 +21,7 @@ class Tell(Behavior):
 
     name: str
 
-    def decide(self, now: Situation) -> Plan:
+    def decide(self, now):
         shut = "shut" if now.home.shut else "open"
         STORY.append((now.step, f"{self.name}, {shut}"))
         return now.plan().stay(timedelta(minutes=1))
@@ -32,7 +30,7 @@ class Tell(Behavior):
 class Learn(Algorithm):
     """Tells when it is updated."""
 
-    def update(self, history: Any, state: Any) -> Any:
+    def update(self, history, state):
         STORY.append((state.step, "algorithm"))
         return {"at": state.step}
 
@@ -40,14 +38,14 @@ class Learn(Algorithm):
 class Measure(Metric):
     """Tells when it is updated."""
 
-    def update(self, history: Any, state: Any) -> None:
+    def update(self, history, state):
         STORY.append((state.step, f"metric after {state.outputs['learn']['at']}"))
 
 
-def told(duration: str = "150 s", **more: Any) -> dict[str, Any]:
+def told(duration="150 s", **more):
     """A user and two robots who decide every minute, and a door that is shut after one."""
 
-    def body(name: str) -> dict[str, Any]:
+    def body(name):
         return {"start": [1.0, 3.0], "behaviors": [Tell(name=name)]}
 
     return scenario(
@@ -99,7 +97,7 @@ def test_what_a_script_does_at_a_step_comes_before_all_else(story):
     assert (30, "bolt, shut") == story[-1]
 
 
-def spans_of(simulation: fleet2d.Simulation, end: int) -> Iterator[tuple[Span, int, Any]]:
+def spans_of(simulation, end):
     """Run span by span; yield each with where `move` would have ended it, and what was due."""
     state = simulation._state
     while simulation.step < end:

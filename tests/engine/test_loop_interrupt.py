@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-from typing import Any
 
 import pytest
 from tests.scenes import OWN, digests, every_step, run, scenario
@@ -11,14 +10,14 @@ from tests.scenes import OWN, digests, every_step, run, scenario
 import fleet2d
 
 
-def endless(**simulation: Any) -> dict[str, Any]:
+def endless(**simulation):
     """A run that would take hours: a step at a time."""
     content = every_step("300 d")
     content["simulation"] |= simulation
     return content
 
 
-def interrupt_after(seconds: float) -> threading.Timer:
+def interrupt_after(seconds):
     timer = threading.Timer(seconds, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     return timer
@@ -66,7 +65,7 @@ def test_the_handler_of_the_caller_is_put_back():
 
 
 def test_a_run_in_another_thread_leaves_signals_alone():
-    done: list[Any] = []
+    done = []
     thread = threading.Thread(target=lambda: done.append(run(scenario("1 min")).status))
     thread.start()
     thread.join()

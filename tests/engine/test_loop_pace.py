@@ -1,7 +1,6 @@
 """Running at a multiple of real time."""
 
 import time
-from typing import Any
 
 import pytest
 from tests.scenes import OWN, digests, run, scenario
@@ -10,7 +9,7 @@ import fleet2d
 from fleet2d.engine.loop import Pace
 
 
-def content(duration: str, speedup: float | None, **sections: Any) -> dict[str, Any]:
+def content(duration, speedup, **sections):
     return scenario(
         duration,
         users={"ana": {"type": "meander"}},
@@ -23,14 +22,14 @@ def content(duration: str, speedup: float | None, **sections: Any) -> dict[str, 
 class Wall:
     """A clock on the wall that only moves when somebody sleeps or looks at it."""
 
-    def __init__(self, look_s: float = 0.0) -> None:
+    def __init__(self, look_s=0.0):
         self.now, self.look_s = 0.0, look_s
 
-    def perf_counter(self) -> float:
+    def perf_counter(self):
         self.now += self.look_s  # what computing costs
         return self.now
 
-    def sleep(self, seconds: float) -> None:
+    def sleep(self, seconds):
         self.now += seconds
 
 

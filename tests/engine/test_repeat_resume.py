@@ -12,7 +12,6 @@ import time
 from functools import cache
 from pathlib import Path
 from threading import Lock
-from typing import Any
 
 import pytest
 from tests.scenes import cut_off, digests, everything, fleet2d_process, scenario
@@ -23,6 +22,7 @@ from fleet2d import Algorithm
 from fleet2d.artifacts import arrow
 from fleet2d.artifacts.unfinished import CHECKPOINT_NAME, FOLDER, JOURNAL_NAME
 from fleet2d.artifacts.verification import verify_run
+from fleet2d.engine.repeat import reopen
 from fleet2d.entities.plan import data_of
 from fleet2d.errors import ArtifactError, Fleet2DError, RunDirectoryError
 from fleet2d.interventions import Decide, Put, Replan
@@ -34,14 +34,14 @@ KILLS = int(os.environ.get("FLEET2D_KILLS", "100" if THOROUGH else "4"))
 CHECKPOINTED = {"checkpoint": "10 min"}
 
 
-def content(duration: str = "1 h", **artifacts: Any) -> dict[str, Any]:
+def content(duration="1 h", **artifacts):
     found = everything(duration)
     found["artifacts"] = {**found["artifacts"], **CHECKPOINTED, **artifacts}
     return found
 
 
 @cache
-def undisturbed(duration: str = "1 h") -> dict[str, Any]:
+def undisturbed(duration="1 h"):
     return digests(fleet2d.run(everything(duration)))
 
 
@@ -59,51 +59,56 @@ def test_a_run_that_was_cut_off_goes_on_from_its_checkpoint(tmp_path, minutes):
 
 def test_a_run_may_be_cut_off_many_times(tmp_path):
     simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
-    for minute in (12, 25, 31, 44, 58):
+    for minute in (12, 25, 31):
         simulation.run_until(60 * minute)
-        directory = cut_off(simulation)
-        from fleet2d.engine.repeat import reopen
-
-        simulation, remark = reopen(directory)
+        simulation, remark = reopen(cut_off(simulation))
         assert f"step {600 * (minute // 10)}" in remark
-    assert undisturbed() == digests(simulation.run())
-    assert [600, 1200, 1800, 2400, 3000] == fleet2d.open_run(directory).manifest["resumed"]
+    stored = simulation.run()
+    assert undisturbed() == digests(stored)
+    assert [600, 1200, 1800] == stored.manifest["resumed"]
 
 
 def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path):
     simulation = fleet2d.Simulation(content(checkpoint="auto"), out=tmp_path / "run")
     simulation.advance(1234)
-    stored = simulation.finish()
-    assert "interrupted" == stored.status
-    assert [] == stored.verify()
+    assert "interrupted" == simulation.finish().status
     assert verify_run(tmp_path / "run").same
     done = fleet2d.resume(tmp_path / "run")
     assert undisturbed() == digests(done)
     assert [1234] == done.manifest["resumed"]
 
 
-def test_without_a_checkpoint_a_run_begins_anew(tmp_path):
-    simulation = fleet2d.Simulation(content(checkpoint="off"), out=tmp_path / "run")
-    simulation.run_until(2000)
-    assert undisturbed() == digests(fleet2d.resume(cut_off(simulation)))
+def replace(old, new):
+    """Return what replaces bytes of a checkpoint."""
 
-
-@pytest.mark.parametrize("damage", ["checkpoint", "journal", "version"])
-def test_with_a_damaged_checkpoint_a_run_begins_anew(tmp_path, damage):
-    simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
-    simulation.run_until(2000)
-    folder = cut_off(simulation) / FOLDER
-    if damage == "journal":
-        os.truncate(folder / JOURNAL_NAME, 1000)
-    else:
+    def damage(folder):
         path = folder / CHECKPOINT_NAME
-        old, new = (b"0.1.0", b"0.0.1") if damage == "version" else (b"\0", b"\1")
         path.write_bytes(path.read_bytes().replace(old, new, 1))
-    assert undisturbed() == digests(fleet2d.resume(tmp_path / "run"))
+
+    return damage
+
+
+@pytest.mark.parametrize(
+    ("checkpoint", "damage"),
+    [
+        ("off", lambda folder: None),
+        ("10 min", lambda folder: os.truncate(folder / JOURNAL_NAME, 1000)),
+        ("10 min", replace(b"0.1.0", b"0.0.1")),
+        ("10 min", replace(b"\0", b"\1")),
+    ],
+    ids=["none", "journal cut off", "another version", "a bit flipped"],
+)
+def test_without_a_whole_checkpoint_a_run_begins_anew(tmp_path, checkpoint, damage):
+    simulation = fleet2d.Simulation(content(checkpoint=checkpoint), out=tmp_path / "run")
+    simulation.run_until(2000)
+    damage(cut_off(simulation) / FOLDER)
+    done = fleet2d.resume(tmp_path / "run")
+    assert [] == done.manifest["resumed"]
+    assert undisturbed() == digests(done)
 
 
 def test_what_was_done_to_a_run_is_done_again(tmp_path):
-    def steered(**more: Any) -> fleet2d.Simulation:
+    def steered(**more):
         simulation = fleet2d.Simulation(content(), **more)
         simulation.run_until(700)
         simulation.do(Put("ana", "kitchen"))
@@ -172,7 +177,6 @@ def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path, name):
     [
         ("rows", [[0, 1, 2, 3]], r"plan: rows\.0"),
         ("rows", [], "can't be followed"),
-        ("rows", [[0, -5, 0, 0, 0]], "should be in the home"),
         ("rows", [[0, 12257, 19200, 0, 0]], "should be in the home"),  # above it, but as wide
         ("rows", [[10**9, 12257, 7521, 0, 0]], "the first at 0 us or before"),
         ("rows", [[0, 12257, 7521, 0, 7]], "away must be 0 or 1"),
@@ -216,10 +220,10 @@ def test_an_input_that_changed_is_not_gone_on_with(tmp_path):
 class KeepsALock(Algorithm):
     """Keeps what no file can hold."""
 
-    def start(self, home: Any) -> None:
+    def start(self, home):
         self.lock = Lock()
 
-    def update(self, history: Any, state: Any) -> None:
+    def update(self, history, state):
         """Do nothing."""
 
 
@@ -237,42 +241,34 @@ def test_a_component_that_can_not_be_kept_is_named_and_the_run_begins_anew(tmp_p
 # Kills
 
 
-@pytest.fixture(scope="module")
-def forks():
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["fleet2d.engine.simulation", "fleet2d.artifacts.arrow"])
-    return context
-
-
 @pytest.mark.slow
-def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path, forks):
+def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path):
     found, rng = content("2 h"), random.Random(14)
+    forks = multiprocessing.get_context("forkserver")
+    forks.set_forkserver_preload(["fleet2d.engine.simulation", "fleet2d.artifacts.arrow"])
 
-    def begin(out: Path, *, again: bool = False) -> Any:
-        if again:
-            run = forks.Process(target=fleet2d.resume, args=(out,), kwargs={"trust": True})
-        else:
-            run = forks.Process(target=fleet2d.run, args=(found,), kwargs={"out": out})
+    def begin(function, *arguments, **keywords):
+        run = forks.Process(target=function, args=arguments, kwargs=keywords)
         run.start()
         return run
 
-    def kill(run: Any) -> None:
+    def kill(run):
         time.sleep(rng.uniform(0, took))
         run.kill()
         run.join()
 
     began = time.perf_counter()
-    begin(tmp_path / "whole").join()
+    begin(fleet2d.run, found, out=tmp_path / "whole").join()
     took = time.perf_counter() - began
     expected = digests(fleet2d.open_run(tmp_path / "whole"))
     resumed = set()
     for number in range(KILLS):
         out = tmp_path / str(number)
-        kill(begin(out))
+        kill(begin(fleet2d.run, found, out=out))
         if not (out / "manifest.json").exists():
             continue  # it had not begun
         if number % 2 and fleet2d.open_run(out).status != "complete":
-            kill(begin(out, again=True))
+            kill(begin(fleet2d.resume, out, trust=True))
         if fleet2d.open_run(out).status != "complete":
             fleet2d.resume(out, trust=True)
         stored = fleet2d.open_run(out)
@@ -290,12 +286,13 @@ def test_killed_at_random_moments_and_resumed_it_is_the_same(tmp_path, forks):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", some([signal.SIGTERM, signal.SIGINT], 2))
 def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path, number):
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = ["-m", "fleet2d.cli", "run", "simulation.duration=20000 d", "--seed", "4"]
     run = subprocess.Popen(
         [sys.executable, *command, "--out", str(tmp_path / "run")],
-        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment,
-    )  # fmt: skip
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
     while not (tmp_path / "run" / FOLDER / JOURNAL_NAME).exists():
         time.sleep(0.05)
         assert run.poll() is None
@@ -310,11 +307,6 @@ def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path, number):
     stored = fleet2d.open_run(tmp_path / "run")
     assert "interrupted" == stored.status
     assert [] == stored.verify()
-    day, clock = last.split()[2:4]
-    assert (
-        f"{day} {clock.rstrip(';')}" in str(stored.tables["events"]["time"][-1].as_py())
-        or stored.manifest["steps"]
-    )
 
 
 # Faults
@@ -333,41 +325,41 @@ class Disk:
         dies: Whether the process ends with it, so that all later ones fail too.
     """
 
-    def __init__(self, patch: pytest.MonkeyPatch, fails_at: int, *, dies: bool) -> None:
+    def __init__(self, patch, fails_at, *, dies):
         self.count, self.fails_at, self.dies = 0, fails_at, dies
-        self.synced: dict[Path, int] = {}
-        self.written: set[Path] = set()
-        self.locks: list[files.FolderLock] = []
+        self.synced = {}
+        self.written = set()
+        self.locks = []
         self.is_dead = False
         write_all, sync, replace = files.write_all, files.sync, files.replace
         parquet, take = arrow.ParquetTable.write, files.FolderLock.__init__
 
-        def counted_write(handle: int, data: bytes) -> None:
+        def counted_write(handle, data):
             self.written.add(self.path(handle))
             if self.operation():
                 write_all(handle, data[: len(data) // 2])
                 self.fail()
             write_all(handle, data)
 
-        def counted_sync(handle: int) -> None:
+        def counted_sync(handle):
             if self.operation():
                 self.fail()
             sync(handle)
             self.synced[self.path(handle)] = os.fstat(handle).st_size
 
-        def counted_replace(path: Path, by: Path) -> None:
+        def counted_replace(path, by):
             if self.operation():
                 self.fail()
             replace(path, by)
             self.written.add(path)
             self.synced[path] = self.synced.pop(by, 0)
 
-        def counted_parquet(table: Any, *rows: Any) -> None:
+        def counted_parquet(table, *rows):
             if self.operation():
                 self.fail()
             parquet(table, *rows)
 
-        def kept_lock(taken: files.FolderLock, *where: Any) -> None:
+        def kept_lock(taken, *where):
             take(taken, *where)
             self.locks.append(taken)
 
@@ -378,20 +370,20 @@ class Disk:
         patch.setattr(files.FolderLock, "__init__", kept_lock)
 
     @staticmethod
-    def path(handle: int) -> Path:
+    def path(handle):
         return Path(f"/proc/self/fd/{handle}").readlink()
 
-    def operation(self) -> bool:
+    def operation(self):
         self.count += 1
         return self.is_dead or self.count == self.fails_at
 
-    def fail(self) -> None:
+    def fail(self):
         if self.dies:
             self.is_dead = True
             raise Crash
         raise OSError(5, "Input/output error")
 
-    def end(self, *, drop: bool) -> None:
+    def end(self, *, drop):
         """Let go of the locks as the system does; drop what was never synced."""
         for taken in self.locks:
             if taken._handle >= 0:
@@ -402,7 +394,7 @@ class Disk:
                 os.truncate(path, min(self.synced.get(path, 0), path.stat().st_size))
 
 
-def short(checkpoint: str = "5 min") -> dict[str, Any]:
+def short(checkpoint="5 min"):
     """Somebody, a robot and what it learns: few objects to write, as many files as any run."""
     whole = everything("20 min")
     for kind, name in (("users", "ana"), ("robots", "bolt"), ("algorithms", "share")):
@@ -412,11 +404,11 @@ def short(checkpoint: str = "5 min") -> dict[str, Any]:
 
 
 @cache
-def undisturbed_short() -> dict[str, Any]:
+def undisturbed_short():
     return digests(fleet2d.run(short("off")))
 
 
-def run_with_fault(out: Path, fails_at: int, *, dies: bool, drop: bool = False) -> int:
+def run_with_fault(out, fails_at, *, dies, drop=False):
     """Run with a fault; return the number of operations."""
     with pytest.MonkeyPatch.context() as patch:
         disk = Disk(patch, fails_at, dies=dies)
@@ -454,8 +446,7 @@ def test_after_a_fault_at_any_operation_a_run_is_gone_on_with(
         if not (out / "manifest.json").exists():
             continue  # before the first step: nothing is lost
         stored = fleet2d.open_run(out)
-        for name in stored.tables:
-            assert stored.tables[name].num_rows >= 0
+        assert all(rows.num_rows >= 0 for rows in stored.tables.values()), "all can be read"
         if stored.status != "complete":
             fleet2d.resume(out)
             resumed += 1

@@ -2,22 +2,19 @@
 
 import copy
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from tests.engine.test_cameras import looks
-from tests.scenes import OWN, digests, everything, run, table
+from tests.scenes import OWN, digests, run, table
 
 import fleet2d
-from fleet2d.engine.cameras import Cameras
 from fleet2d.engine.sighting_errors import SightingErrors
-from fleet2d.runs.run import Run
 
 ERRORS = OWN.replace("own_components", "own_errors")
 
 
-def unsure(**errors: Any) -> dict[str, Any]:
+def unsure(**errors):
     """Four robots with cameras of all kinds, whose perceptions all have these errors."""
     content = looks()
     content["simulation"]["duration"] = "20 min"
@@ -30,13 +27,13 @@ def unsure(**errors: Any) -> dict[str, Any]:
     return content
 
 
-def astro_with(errors: dict[str, Any]) -> dict[str, Any]:
+def astro_with(errors):
     """Return the section of robots with one, which has these errors."""
     robots = unsure()["robots"]
     return {"robots": {"astro": {**robots["astro"], "perception": {"errors": errors}}}}
 
 
-def reactions(stored: Run) -> list[Any]:
+def reactions(stored):
     """Return the events of seeing and losing, and what robots do about them."""
     rows = stored.tables["events"].to_pylist()
     return [row for row in rows if row["event"] in ("user_seen", "user_lost", "reacts")]
@@ -93,7 +90,7 @@ def test_events_are_those_of_the_look(monkeypatch):
     expected = digests(run(content))
     change, calls = SightingErrors.change, []
 
-    def as_if_changed(self: Any, rows: Any, memory: Any, before: Any, *rest: Any) -> Any:
+    def as_if_changed(self, rows, memory, before, *rest):
         rows, _ = change(self, rows, memory, before, *rest)
         memory.noticed[:], memory.seen[:] = before.noticed, before.seen
         calls.append(len(rows))
@@ -103,20 +100,6 @@ def test_events_are_those_of_the_look(monkeypatch):
     assert expected == digests(run(content))
     assert len(calls) > 50
     assert expected == digests(run(unsure()))
-
-
-def test_observations_have_the_truth_beside_what_is_perceived():
-    content = everything("1 h")
-    content["robots"] = {"curio": content["robots"]["curio"]}
-    perfect = table(run(content), "observations")
-    content["robots"]["curio"]["perception"] = {"errors": {"miscalibration": {"yaw_deg": 3}}}
-    rows = table(run(content), "observations")
-    assert "true_x" not in perfect
-    for name in ("step", "x", "y"):
-        np.testing.assert_array_equal(
-            perfect[name], rows[f"true_{name}" if name != "step" else name]
-        )
-    assert (np.hypot(rows["x"] - rows["true_x"], rows["y"] - rows["true_y"]) > 0.01).mean() > 0.9
 
 
 def test_each_camera_may_have_its_own_errors_and_each_error_its_own_draws():
@@ -203,12 +186,3 @@ def test_a_fault_brings_errors_to_the_looks_within_it(robot):
     assert is_off[is_within].mean() > 0.9
     assert is_within.sum() > 10 < (~is_within).sum()
     assert not is_off[~is_within].any()
-
-
-def test_scenarios_without_errors_have_nothing_after_the_look():
-    state = fleet2d.Simulation(looks())._state
-    assert all(cameras.sighting_errors is None for cameras in state.cameras)
-    state = fleet2d.Simulation(unsure(a={"type": "Blinking"}))._state
-    assert all(
-        isinstance(cameras, Cameras) and cameras.sighting_errors for cameras in state.cameras
-    )

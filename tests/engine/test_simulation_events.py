@@ -1,7 +1,7 @@
 """Waiting for events and listening to them: all that is stored, in order, at once."""
 
 import copy
-from typing import Any
+from functools import cache
 
 import pytest
 
@@ -25,7 +25,7 @@ WITHOUT_LEARNERS = {
 }
 
 
-def stored(run: Any) -> list[tuple[int, str, str]]:
+def stored(run):
     """Return what a run stored, by step: events, and readings of sensors."""
     events = [
         (row["step"], row["entity"] or "", row["event"]) for row in run.tables["events"].to_pylist()
@@ -34,56 +34,40 @@ def stored(run: Any) -> list[tuple[int, str, str]]:
     return sorted([*events, *readings])
 
 
-@pytest.mark.parametrize("content", [DAY, DAY | WITHOUT_LEARNERS], ids=["learns", "only_lives"])
-def test_a_listener_hears_all_that_is_stored(content):
-    simulation = fleet2d.Simulation(content)
-    heard: list[tuple[int, str, str]] = []
-    simulation.listen(lambda events: heard.extend((e.step, e.entity, str(e.event)) for e in events))
+CONTENTS = {"learns": DAY, "only lives": DAY | WITHOUT_LEARNERS}
 
+
+@cache
+def whole(name):
+    return fleet2d.run(CONTENTS[name])
+
+
+@pytest.mark.parametrize("name", CONTENTS)
+def test_a_listener_hears_all_that_is_stored_in_its_order_before_the_next_step(name):
+    simulation = fleet2d.Simulation(CONTENTS[name])
+    heard, late = [], set()
+
+    def listen(events):
+        heard.extend((e.step, e.entity, str(e.event)) for e in events)
+        late.update(simulation.step - e.step for e in events)
+
+    simulation.listen(listen)
     run = simulation.run()
 
-    kinds = {event for _, _, event in heard}
-    assert {"sensor", "opened", "activity"} <= kinds
+    assert {"sensor", "opened", "activity"} <= {event for _, _, event in heard}
     assert sorted(heard) == stored(run)
-    assert [step for step, _, _ in heard] == sorted(step for step, _, _ in heard)
-
-
-def test_a_listener_hears_events_in_the_order_of_the_table():
-    simulation = fleet2d.Simulation(DAY)
-    heard: list[tuple[int, str, str]] = []
-    simulation.listen(
-        lambda events: heard.extend(
-            (e.step, e.entity, str(e.event)) for e in events if e.event != "sensor"
-        )
-    )
-
-    table = simulation.run().tables["events"].to_pylist()
-
-    assert heard == [(row["step"], row["entity"] or "", row["event"]) for row in table]
-
-
-def test_a_listener_is_called_before_the_next_step():
-    simulation = fleet2d.Simulation(DAY)
-    late: list[int] = []
-    simulation.listen(lambda events: late.extend(simulation.step - e.step for e in events))
-
-    simulation.run()
-
-    assert set(late) == {1}
-
-
-def test_listening_does_not_change_the_run():
-    simulation = fleet2d.Simulation(DAY)
-    simulation.listen(lambda events: None)
-
-    assert simulation.run().digest == fleet2d.run(DAY).digest
+    table = run.tables["events"].to_pylist()
+    rows = [(row["step"], row["entity"] or "", row["event"]) for row in table]
+    assert rows == [each for each in heard if each[2] != "sensor"]
+    assert {1} == late
+    assert whole(name).digest == run.digest
 
 
 def test_a_listener_gets_only_its_kinds_and_may_intervene():
     content = DAY | {"robots": {"astro": {"behaviors": [{"type": "come"}, {"type": "patrol"}]}}}
     simulation = fleet2d.Simulation(content, "simulation.start=2026-01-05T07:00")
 
-    def come(events: Any) -> None:
+    def come(events):
         for event in events:
             assert event.event == "sensor"
             simulation.do({"call": "astro", "to": "kitchen_1"})
@@ -98,9 +82,10 @@ def test_a_listener_gets_only_its_kinds_and_may_intervene():
 
 
 def test_a_copy_has_no_listener():
-    simulation = fleet2d.Simulation(DAY)
-    heard: list[Any] = []
+    simulation = fleet2d.Simulation(DAY, "simulation.duration=10 h")
+    heard = []
     simulation.listen(heard.extend)
+    simulation.listen_rows(lambda table, row: heard.append(row))
 
     twin = copy.deepcopy(simulation)
     twin.run()
@@ -115,15 +100,14 @@ def test_an_unknown_kind_is_refused_with_the_nearest_name():
 
 
 @pytest.mark.parametrize("event", ["sensor", "opened", "activity", "user_seen"])
-def test_running_until_an_event_stops_at_the_step_after_it(event):
-    for content in (DAY, DAY | WITHOUT_LEARNERS):
-        first = next(step for step, _, name in stored(fleet2d.run(content)) if name == event)
-        simulation = fleet2d.Simulation(content)
+@pytest.mark.parametrize("name", CONTENTS)
+def test_running_until_an_event_stops_at_the_step_after_it(event, name):
+    first = next(step for step, _, kind in stored(whole(name)) if kind == event)
+    simulation = fleet2d.Simulation(CONTENTS[name])
 
-        result = simulation.run_until(event=event)
+    result = simulation.run_until(event=event)
 
-        assert result is not None
-        assert (result.step, simulation.step) == (first, first + 1)
+    assert (result.step, simulation.step) == (first, first + 1)
 
 
 def test_running_until_a_sensor_reports_names_its_state():
@@ -134,13 +118,3 @@ def test_running_until_a_sensor_reports_names_its_state():
     assert event is not None
     assert event.detail == "ON"
     assert simulation.state["hall_motion"]["on"]
-
-
-def test_a_copy_of_a_run_does_not_call_those_who_listen_to_rows():
-    simulation = fleet2d.Simulation("bundled:paper", "simulation.duration=2 h", seed=4)
-    tables: list[str] = []
-    simulation.listen_rows(lambda table, row: tables.append(table))
-
-    copy.deepcopy(simulation).run()
-
-    assert not tables

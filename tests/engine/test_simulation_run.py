@@ -5,7 +5,7 @@ import shutil
 
 import pyarrow.parquet as pq
 import pytest
-from tests.scenes import TESTS, everything, scenario, write_flat
+from tests.scenes import everything, scenario, write_flat
 
 import fleet2d
 from fleet2d.errors import RunDirectoryError
@@ -20,10 +20,12 @@ def stored(tmp_path_factory):
 
 
 def test_a_stored_run_is_reproduced(stored):
+    before = {path.name: path.read_bytes() for path in stored.iterdir()}
     result = fleet2d.reproduce(stored)
     assert result.same
     assert ([], []) == (result.differing, result.causes)
     assert fleet2d.open_run(stored).digest == result.digest
+    assert before == {path.name: path.read_bytes() for path in stored.iterdir()}
 
 
 def test_the_order_of_keys_is_kept_for_who_repeats_a_run(tmp_path):
@@ -33,20 +35,12 @@ def test_the_order_of_keys_is_kept_for_who_repeats_a_run(tmp_path):
     users = {"zoe": sampled, "ben": sampled, "ana": {"type": "meander"}}
     stored = fleet2d.run(scenario("1 h", users=users), out=tmp_path / "run")
     result = fleet2d.reproduce(tmp_path / "run")
-    by_name = {**sampled, "shares": dict(sorted(shares.items()))}
-    other = fleet2d.run(
-        scenario("1 h", users={"ana": users["ana"], "ben": by_name, "zoe": by_name})
-    )
 
     assert ([], stored.digest) == (result.differing, result.digest)
     assert ["zoe", "ben", "ana"] == list(stored.manifest["scenario"]["users"])
-    assert other.digest != stored.digest
-
-
-def test_reproducing_leaves_the_run_as_it_was(stored):
-    before = {path.name: path.read_bytes() for path in stored.iterdir()}
-    fleet2d.reproduce(stored)
-    assert before == {path.name: path.read_bytes() for path in stored.iterdir()}
+    assert list(shares) == list(
+        stored.manifest["scenario"]["users"]["zoe"]["behaviors"][0]["shares"]
+    )
 
 
 def test_a_manifest_with_another_seed_is_not_reproduced(stored, tmp_path):
@@ -80,21 +74,6 @@ def test_a_paced_run_is_reproduced_as_fast_as_possible(tmp_path, monkeypatch):
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
-def test_an_input_that_changed_is_named(tmp_path):
-    plan = write_flat(tmp_path)
-    content = scenario(robots={"astro": {"type": "patrol"}})
-    content["floorplan"]["path"] = str(plan)
-    fleet2d.run(content, out=tmp_path / "run")
-    document = json.loads(plan.read_text())
-    document["rooms"].pop(1)
-    plan.write_text(json.dumps(document))
-    result = fleet2d.reproduce(tmp_path / "run")
-    assert not result.same
-    (cause,) = result.causes
-    assert "flat.json" in cause
-    assert "changed" in cause
-
-
 def test_an_input_that_is_gone_is_named(tmp_path):
     plan = write_flat(tmp_path)
     content = scenario(robots={"astro": {"type": "patrol"}})
@@ -105,40 +84,13 @@ def test_an_input_that_is_gone_is_named(tmp_path):
         fleet2d.reproduce(tmp_path / "run")
 
 
-def test_a_component_that_is_gone_is_named(tmp_path):
-    module = tmp_path / "mine.py"
-    module.write_text((TESTS / "own_components.py").read_text())
-    content = scenario(algorithms={"share": {"type": f"{tmp_path.as_posix()}/mine:Share"}})
-    fleet2d.run(content, out=tmp_path / "run")
-    module.unlink()
-    with pytest.raises(RunDirectoryError, match=r"mine\.py.*missing"):
-        fleet2d.reproduce(tmp_path / "run", trust=True)
-
-
 def test_only_a_complete_run_can_be_reproduced(tmp_path):
     simulation = fleet2d.Simulation(
         scenario(users={"ana": {"type": "meander"}}), out=tmp_path / "run"
     )
     simulation.advance(10)
     simulation.finish()
-    with pytest.raises(RunDirectoryError, match="interrupted"):
-        fleet2d.reproduce(tmp_path / "run")
-
-
-def test_what_is_no_run_is_refused(tmp_path):
-    with pytest.raises(RunDirectoryError, match=r"manifest\.json"):
-        fleet2d.reproduce(tmp_path)
-    with pytest.raises(RunDirectoryError, match="does not exist"):
-        fleet2d.reproduce(tmp_path / "nothing")
-
-
-def test_arguments_change_the_scenario():
-    content = scenario(users={"ana": {"type": "meander"}})
-    stored = fleet2d.run(content, "simulation.duration=2 min", seed=9)
-    assert (120, 9) == (stored.manifest["steps"], stored.manifest["seed"])
-
-
-def test_a_scenario_that_was_loaded_runs_as_its_source_does():
-    content = everything("5 min")
-    loaded = fleet2d.load_scenario(content)
-    assert fleet2d.run(content).digest == fleet2d.run(loaded).digest == fleet2d.run(loaded).digest
+    places = {"run": "interrupted", "": r"manifest\.json", "nothing": "does not exist"}
+    for name, words in places.items():
+        with pytest.raises(RunDirectoryError, match=words):
+            fleet2d.reproduce(tmp_path / name)

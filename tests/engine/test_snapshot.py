@@ -8,10 +8,8 @@ import json
 import os
 import pickle
 import random
-from collections.abc import Callable
+from contextlib import nullcontext
 from functools import cache, partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,13 +17,12 @@ from tests.engine.test_cameras_perceiving import full
 from tests.scenes import digests, every_step, everything, process, run, scenario
 from tests.thorough import THOROUGH, some
 
-from fleet2d import Algorithm, Behavior, Plan, Simulation, Situation
+from fleet2d import Algorithm, Simulation
 from fleet2d.engine import checkpoint
 from fleet2d.engine.simulation import PURPOSE
 from fleet2d.engine.snapshot import MAGIC, open_snapshot
 from fleet2d.errors import ArtifactError, ComponentError, InputError
 from fleet2d.interventions import OpenDoor, Put, Replan
-from fleet2d.runtime.events import Event
 from fleet2d.storage.secret_files import signature
 
 HOUSE = {
@@ -36,30 +33,31 @@ HOUSE = {
 }
 
 
-def house(duration: str = "10 min") -> dict[str, Any]:
+def house(duration="5 min"):
     """Doors, sensors, layers, people who react, robots that give way and don't know their place."""
     content = everything(duration, objects=HOUSE)
     content["script"] = [
-        {"at": "4 min", "shut": "bath"},
-        {"at": "6 min", "lock": "hall"},
-        {"at": "8 min", "unlock": "hall"},
+        {"at": "2 min", "shut": "bath"},
+        {"at": "3 min", "lock": "hall"},
+        {"at": "4 min", "unlock": "hall"},
     ]
     seen = {name: {"store": True} for name in ("explored", "last_seen")}
-    content["floorplan"]["layers"] = {**seen, "costmap": {"store": True, "every": "5 min"}}
+    content["floorplan"]["layers"] = {**seen, "costmap": {"store": True, "every": "2 min"}}
     content["users"]["cleo"] = {"behaviors": ["reactions", "meander"]}
     content["robots"]["astro"] |= {"gives_way": {}, "localization": {}}
-    content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "3 min", "source": "rtp"}
+    content["robots"]["zed"] = {"type": "find", "user": "ana", "every": "2 min", "source": "rtp"}
     on = {"type": "tests.engine.test_events:Heard", "on": ["sensor", "user_lost"]}
     content["algorithms"] |= {
         "rtp": {"type": "real_time_presence"},
         "ltp": {"type": "long_term_presence"},
         "heard": on,
     }
+    content["expect"] = {"sees": "eventually(seen(ben, by=astro))", "off": "never(moving(zed))"}
     content["metrics"] |= {"rtp_score": {"of": "rtp"}, "detections": {}, "coverage": {}}
     return content
 
 
-def routine() -> dict[str, Any]:
+def routine():
     """The bundled home, with people of a household and a robot that learns where they are."""
     member = {"type": "routine", "household": {"members": {"ana": "works_from_home"}}}
     return {
@@ -72,7 +70,7 @@ def routine() -> dict[str, Any]:
     }
 
 
-def markov() -> dict[str, Any]:
+def markov():
     return {
         "simulation": {"start": "2026-01-05T06:00", "duration": "6 h", "seed": 4},
         "floorplan": {"type": "bundled"},
@@ -85,7 +83,7 @@ def markov() -> dict[str, Any]:
 
 
 LONG = "40 min" if THOROUGH else "20 min"
-SCENES: dict[str, Callable[[], dict[str, Any]]] = {
+SCENES = {
     "every behavior": partial(everything, LONG),
     "cameras that err": partial(full, LONG),
     "doors, sensors, layers": house,
@@ -99,26 +97,26 @@ SCENES: dict[str, Callable[[], dict[str, Any]]] = {
 
 
 @cache
-def undisturbed(scene: str) -> tuple[dict[str, Any], str]:
+def undisturbed(scene):
     """Return the digests of a run, and its metrics."""
     stored = run(SCENES[scene]())
     return digests(stored), json.dumps(stored.metrics, sort_keys=True)
 
 
-def result(simulation: Simulation) -> tuple[dict[str, Any], str]:
+def result(simulation):
     """Run to the end, and return the same."""
     stored = simulation.run()
     return digests(stored), json.dumps(stored.metrics, sort_keys=True)
 
 
-def through_a_stream(simulation: Simulation) -> Simulation:
+def through_a_stream(simulation):
     file = io.BytesIO()
     simulation.save(file)
     file.seek(0)
     return Simulation.load(file)
 
 
-WAYS: dict[str, Callable[[Simulation], Simulation]] = {
+WAYS = {
     "deepcopy": copy.deepcopy,
     "pickle": lambda simulation: pickle.loads(pickle.dumps(simulation)),
     "save": through_a_stream,
@@ -148,8 +146,8 @@ def test_a_copy_made_at_any_step_goes_on_to_the_same_run(scene, way):
     assert undisturbed(scene) == result(simulation)
 
 
-@pytest.mark.parametrize("scene", some(["cameras that err", "doors, sensors, layers"], 2))
-def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene):
+def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run():
+    scene = "cameras that err"
     simulation, ways = Simulation(SCENES[scene]()), random.Random(scene)
     while not simulation.done:
         simulation.advance(ways.choice([1, 7, 300, 611]))
@@ -160,15 +158,14 @@ def test_a_copy_of_a_copy_of_a_copy_goes_on_to_the_same_run(scene):
 @pytest.mark.slow
 def test_copies_can_be_changed_without_the_other_noticing():
     simulation = Simulation(house())
-    simulation.advance(350)
-    twins = [way(simulation) for way in some([*WAYS.values()], 2)]
-    for twin in twins:
-        twin.do(Put("ana", "kitchen"))
-        twin.do(OpenDoor("bath"))
-        twin.advance(150)
-        assert simulation.state != twin.state
+    simulation.advance(130)
+    twin = copy.deepcopy(simulation)
+    twin.do(Put("ana", "kitchen"))
+    twin.do(OpenDoor("bath"))
+    twin.advance(150)
+    assert simulation.state != twin.state
     assert undisturbed("doors, sensors, layers") == result(simulation)
-    assert undisturbed("doors, sensors, layers") != result(twins[0])
+    assert undisturbed("doors, sensors, layers") != result(twin)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -182,18 +179,6 @@ def test_a_copy_keeps_what_was_done_and_what_is_still_to_be_done(way):
     twin = WAYS[way](simulation)
     assert ["replan", "put"] == [i["do"] for i in twin.run().manifest["interventions"]]
     assert result(simulation)[0]["run"] == twin.finish().digest
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_a_listener_stays_with_the_one_that_it_listens_to(way):
-    simulation, heard = Simulation(everything("20 min")), list[Event]()
-    simulation.listen(heard.extend)
-    simulation.advance(600)
-    before = len(heard)
-    WAYS[way](simulation).run()
-    assert before == len(heard)
-    simulation.run()
-    assert before < len(heard)
 
 
 def test_copies_in_memory_share_what_never_changes():
@@ -234,21 +219,14 @@ def test_a_read_simulation_has_one_home_and_one_clock():
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_finished_run_does_not_go_on_in_a_copy(way):
-    simulation = Simulation(everything("25 min"))
-    stored = simulation.run()
-    with pytest.raises(InputError, match="finished"):
-        WAYS[way](simulation).advance(1)
-    assert stored.digest == simulation.finish().digest
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_a_run_that_broke_off_does_not_go_on_in_a_copy(way):
+@pytest.mark.parametrize(("breaks", "words"), [(True, "run failed"), (False, "finished")])
+def test_a_run_that_is_over_does_not_go_on_in_a_copy(way, breaks, words):
     bad = {"bad": {"type": "tests.own_components:Bad", "period": "1 min"}}
-    simulation = Simulation(scenario("10 min", algorithms=bad))
-    with pytest.raises(ComponentError):
-        simulation.advance(100)
-    with pytest.raises(InputError, match="run failed"):
+    simulation = Simulation(scenario("10 min", algorithms=bad if breaks else {}))
+    with pytest.raises(ComponentError) if breaks else nullcontext():
+        simulation.advance(600)
+        simulation.finish()
+    with pytest.raises(InputError, match=words):
         WAYS[way](simulation).advance(1)
 
 
@@ -260,7 +238,7 @@ print(fleet2d.Simulation.load(sys.argv[1]).run().digest)
 """
 
 
-def saved(path: Path, content: dict[str, Any] | None = None, steps: int = 500) -> Path:
+def saved(path, content=None, steps=500):
     """Save a run on its way."""
     simulation = Simulation(everything("20 min") if content is None else content)
     simulation.advance(steps)
@@ -271,7 +249,7 @@ def saved(path: Path, content: dict[str, Any] | None = None, steps: int = 500) -
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", some(["doors, sensors, layers", "cameras that err"], 2))
 def test_another_process_goes_on_from_a_file(scene, tmp_path):
-    path = saved(tmp_path / "run.fleet2d", SCENES[scene](), 555)
+    path = saved(tmp_path / "run.fleet2d", SCENES[scene](), 155)
     done = process("-c", LOAD, str(path), timeout=300, PYTHONHASHSEED="3")
     assert 0 == done.returncode, done.stderr
     assert undisturbed(scene)[0]["run"] == done.stdout.strip()
@@ -346,36 +324,24 @@ def test_a_simulation_that_stores_in_a_directory_is_not_saved(tmp_path):
     simulation.finish()
 
 
-def test_a_place_where_nothing_can_be_written_is_an_error_in_words(tmp_path):
-    simulation = Simulation(scenario("2 min"))
-    with pytest.raises(ArtifactError, match=r"run can't be written: No such file"):
-        simulation.save(tmp_path / "nowhere" / "run")
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(ArtifactError, match=r"folder can't be written"):
-        simulation.save(tmp_path / "folder")
-    for path in (".", "/"):
-        with pytest.raises(ArtifactError, match=r"can't be written: Is a directory"):
-            simulation.save(path)
-
-
-@pytest.mark.parametrize("name", ["nowhere", "folder"])
-def test_a_file_that_is_not_there_is_an_error_in_words(tmp_path, name):
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(ArtifactError, match=rf"{name} can't be read: "):
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("nowhere/run", "run can't be written: No such file"),
+        ("", "can't be written: Is a directory"),
+        ("/", "can't be written: Is a directory"),
+    ],
+)
+def test_a_place_where_nothing_can_be_written_or_read_is_an_error_in_words(tmp_path, name, why):
+    with pytest.raises(ArtifactError, match=why):
+        Simulation(scenario("2 min")).save(tmp_path / name)
+    with pytest.raises(ArtifactError, match=why.replace("written", "read")):
         Simulation.load(tmp_path / name)
 
 
 @pytest.mark.parametrize(
     "content",
-    [
-        b"",
-        b"\n",
-        b"hello",
-        b"PK\3\4 a zip",
-        MAGIC[:-1] + b"\n\n\n",
-        pickle.dumps({"a": 1}),
-        bytes(99),
-    ],
+    [b"", b"\n", MAGIC[:-1] + b"\n\n\n", pickle.dumps({"a": 1}), bytes(99)],
 )
 def test_a_foreign_file_is_refused_in_plain_words(tmp_path, content):
     path = tmp_path / "other"
@@ -384,75 +350,43 @@ def test_a_foreign_file_is_refused_in_plain_words(tmp_path, content):
         Simulation.load(path)
 
 
-def test_a_damaged_file_is_refused_wherever_it_is_damaged(tmp_path):
-    path = saved(tmp_path / "run")
-    whole, draws = path.read_bytes(), random.Random(5)
-    for place in [
-        0,
-        len(MAGIC),
-        len(MAGIC) + 5,
-        *(draws.randrange(len(whole)) for _ in range(200)),
-    ]:
-        damaged = bytearray(whole)
-        damaged[place] ^= 1 << draws.randrange(8)
-        path.write_bytes(damaged)
-        with pytest.raises(ArtifactError, match=r"is damaged|is not a saved simulation"):
-            Simulation.load(path)
-    for length in [
-        1,
-        len(MAGIC) + 1,
-        len(MAGIC) + 99,
-        *(draws.randrange(len(whole)) for _ in range(50)),
-    ]:
-        path.write_bytes(whole[:length])
-        with pytest.raises(ArtifactError, match=r"is damaged|is not a saved simulation"):
-            Simulation.load(path)
-    path.write_bytes(whole + b"more")
-    with pytest.raises(ArtifactError, match="is damaged"):
-        Simulation.load(path)
-
-
-def file_of(header: Any, body: bytes, seal: Any = None) -> io.BytesIO:
+def file_of(body, seal=None, **changes):
     """Return a file that this user has signed, or that has another seal, whatever is in it."""
+    saved = io.BytesIO()
+    Simulation(scenario("2 min")).save(saved)
+    saved.seek(0)
+    header = open_snapshot(saved, PURPOSE)[0] | changes
     content = b"\n".join((MAGIC, json.dumps(header).encode(), body))
     seal = signature(PURPOSE) if seal is None else seal
     seal.update(content)
     return io.BytesIO(content + seal.hexdigest().encode())
 
 
-@cache
-def header() -> dict[str, Any]:
-    file = io.BytesIO()
-    Simulation(scenario("2 min")).save(file)
-    file.seek(0)
-    return open_snapshot(file, PURPOSE)[0]
-
-
-def test_a_file_of_another_version_says_which(tmp_path):
+def test_a_file_of_another_version_says_which():
     with pytest.raises(ArtifactError, match=r"written by Fleet2D 0\.0\.7, and this is"):
-        Simulation.load(file_of({**header(), "fleet2d": "0.0.7"}, b""))
+        Simulation.load(file_of(b"", fleet2d="0.0.7"))
 
 
 @pytest.mark.parametrize(
     "body",
-    [b"", b"garbage", pickle.dumps(None), pickle.dumps([1, 2]), pickle.dumps({"a": np.float64})],
+    [b"", b"garbage", pickle.dumps(None), pickle.dumps({"a": np.float64})],
 )
 def test_a_file_without_a_state_is_refused_in_plain_words(body):
     with pytest.raises(ArtifactError, match="no state of a run"):
-        Simulation.load(file_of(header(), body))
+        Simulation.load(file_of(body))
 
 
 class Calls:
     """What a pickle makes of it: a call."""
 
-    def __init__(self, function: Any, *arguments: Any) -> None:
+    def __init__(self, function, *arguments):
         self.call = function, arguments
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self):
         return self.call
 
 
-SEALS: dict[str, Callable[[], Any]] = {
+SEALS = {
     "a digest": hashlib.sha256,
     "another user's key": lambda: hmac.new(b"another", f"{PURPOSE}\n".encode(), "sha256"),
     "no key": lambda: hmac.new(b"", f"{PURPOSE}\n".encode(), "sha256"),
@@ -465,7 +399,7 @@ def test_a_file_that_this_user_has_not_saved_is_not_unpickled(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     body = pickle.dumps(Calls(os.system, "touch made"))
     with pytest.raises(ArtifactError, match="not signed by this user"):
-        Simulation.load(file_of(header(), body, SEALS[seal]()))
+        Simulation.load(file_of(body, SEALS[seal]()))
     assert [] == list(tmp_path.iterdir())
 
 
@@ -487,8 +421,8 @@ class Keeps(Algorithm):
 
     what: str
 
-    def start(self, home: Any) -> None:
-        kept: dict[str, Callable[[], Any]] = {
+    def start(self, home):
+        kept = {
             "file": lambda: open(os.devnull),  # noqa: PTH123, SIM115
             "generator": lambda: (i for i in range(3)),
             "lambda": lambda: lambda: 3,
@@ -497,49 +431,35 @@ class Keeps(Algorithm):
             "objects": lambda: np.array([{"a": 1}, None], object),
             "home": lambda: home,
             "itself": lambda: self,
+            "method": lambda: self.update,
         }
         self.kept, self.count = kept[self.what](), 0
 
-    def update(self, history: Any, state: Any) -> dict[str, Any]:
+    def update(self, history, state):
         self.count += 1
         return {"count": self.count}
 
 
-class Bound(Behavior):
-    """Keeps a method of its own."""
-
-    def start(self, actor: Any) -> None:
-        self.how, self.count = self.go, 0
-
-    def go(self, now: Situation) -> Plan:
-        self.count += 1
-        return now.plan().turn_by(self.count / 100)
-
-    def decide(self, now: Situation) -> Plan:
-        return self.how(now)
-
-
-def keeping(what: str) -> dict[str, Any]:
+def keeping(what):
     own = {"type": f"{__name__}:Keeps", "what": what, "period": "1 min"}
     return scenario("10 min", algorithms={"mine": own}, users={"ana": {"type": "meander"}})
 
 
-@pytest.mark.parametrize("what", ["plain", "objects", "random", "home", "itself"])
+@pytest.mark.parametrize("what", ["plain", "objects", "random", "home", "itself", "method"])
 @pytest.mark.parametrize("way", WAYS)
 def test_what_a_component_keeps_goes_with_it(what, way):
     simulation = Simulation(keeping(what))
     simulation.advance(301)
     twin = WAYS[way](simulation)
-    mine = twin.algorithms["mine"]
+    mine, original = (each.algorithms["mine"] for each in (twin, simulation))
     assert 5 == mine.count
-    assert mine is not simulation.algorithms["mine"]
-    if what == "home":
-        assert mine.kept is twin.home
-    if what == "itself":
-        assert mine.kept is mine
+    assert mine is not original
+    expected = {"home": twin.home, "itself": mine, "method": mine.update}
+    if what in expected:
+        assert mine.kept == expected[what]
     if what == "plain":
-        assert repr(mine.kept) == repr(simulation.algorithms["mine"].kept)
-    assert run(keeping(what)).digest == twin.run().digest
+        assert repr(mine.kept) == repr(original.kept)
+    assert simulation.run().digest == twin.run().digest
 
 
 @pytest.mark.parametrize("what", ["file", "generator", "lambda"])
@@ -551,14 +471,3 @@ def test_what_can_not_be_written_is_an_error_in_words(what, tmp_path):
     assert [] == list(tmp_path.iterdir())
     if what == "file":
         simulation.algorithms["mine"].kept.close()
-
-
-@pytest.mark.parametrize("way", WAYS)
-def test_a_method_that_a_behavior_keeps_is_its_copy_s_own(way):
-    content = scenario("10 min", users={"ana": {"behaviors": [{"type": f"{__name__}:Bound"}]}})
-    simulation = Simulation(content)
-    simulation.advance(77)
-    twin = WAYS[way](simulation)
-    expected = run(content).digest
-    assert expected == twin.run().digest
-    assert expected == simulation.run().digest

@@ -2,13 +2,10 @@
 
 import copy
 import pickle
-from collections.abc import Sequence
 from contextlib import nullcontext
-from typing import Any
 
-import numpy as np
 import pytest
-from tests.scenes import everything, run, scenario, table
+from tests.scenes import everything, run, table
 
 import fleet2d
 from fleet2d.engine.state import EventStream, Listener
@@ -19,14 +16,14 @@ from fleet2d.runtime.events import CHANGES, HOME, SIGHTS, Event, EventKind
 class Sink:
     """Keeps what it is handed."""
 
-    def __init__(self) -> None:
-        self.taken: list[list[Event]] = []
+    def __init__(self):
+        self.taken = []
 
-    def take_events(self, events: Sequence[Event]) -> None:
+    def take_events(self, events):
         self.taken.append(list(events))
 
 
-def event(step: int, kind: str = "found", entity: str = "ana") -> Event:
+def event(step, kind="found", entity="ana"):
     return Event(step, entity, kind, "")
 
 
@@ -48,52 +45,39 @@ def test_every_sink_is_handed_each_event_once_in_the_order_it_became_known():
 
 def test_events_since_a_step_are_in_order_of_step_and_of_kind():
     stream = EventStream()
-    seen, shut, found = event(4, "user_seen"), event(4, "shut", HOME), event(4)
+    seen, shut = event(4, "user_seen"), event(4, "shut", HOME)
+    zoe, ana = event(4, entity="zoe"), event(4)
     stream.emit([event(9), seen, shut])
-    stream.emit([found, event(2)])
-    assert [event(2), found, seen, shut, event(9)] == stream.since(0)
+    stream.emit([zoe, ana, event(2)])
+    assert [event(2), zoe, ana, seen, shut, event(9)] == stream.since(0), "zoe was known first"
     assert [event(9)] == stream.since(5)
     assert [] == stream.since(10)
 
 
-def test_events_of_one_step_and_kind_stay_in_the_order_they_became_known():
-    stream = EventStream()
-    emitted = [event(4, "found", name) for name in ("zoe", "ana", "ben")]
-    stream.emit(emitted)
-    assert emitted == stream.since(4)
-
-
-def test_events_that_are_no_longer_kept_are_asked_for_in_vain():
-    stream = Short()
-    stream.emit([event(step) for step in range(5)])
-    assert list(range(5)) == [e.step for e in stream.since(0)]
-    stream.emit([event(5), event(6)])
-    assert [2, 3, 4, 5, 6] == [e.step for e in stream.since(2)]
-    with pytest.raises(InputError, match=r"from step 2 on are kept, not from step 1: ask more"):
-        stream.since(1)
-
-
-def test_what_became_known_late_is_missed_up_to_its_step():
-    stream = Short()
-    stream.emit([event(90), event(1), event(2)])
-    stream.emit([event(3), event(4), event(5)])
-    with pytest.raises(InputError, match="from step 91 on"):
-        stream.since(90)
-    assert [] == stream.since(91)
-
-
-def test_more_events_at_once_than_are_kept_leave_the_last():
-    stream, sink = Short(), Sink()
-    stream.sinks.append(sink)
-    stream.emit([event(step) for step in range(12)])
-    assert 12 == len(sink.taken[0])
-    assert list(range(7, 12)) == [e.step for e in stream.since(7)]
-    with pytest.raises(InputError, match="from step 7 on"):
-        stream.since(6)
+@pytest.mark.parametrize(
+    ("emitted", "kept", "first"),
+    [
+        ([range(5)], [0, 1, 2, 3, 4], 0),
+        ([range(5), [5, 6]], [2, 3, 4, 5, 6], 2),
+        ([[90, 1, 2], [3, 4, 5]], [], 91),
+        ([range(12)], [7, 8, 9, 10, 11], 7),
+    ],
+    ids=["as many as are kept", "two more", "one became known early", "too many at once"],
+)
+def test_events_that_are_no_longer_kept_are_asked_for_in_vain(emitted, kept, first):
+    sink = Sink()
+    stream = Short([sink])
+    for steps in emitted:
+        stream.emit([event(step) for step in steps])
+    assert [len(steps) for steps in emitted] == [len(taken) for taken in sink.taken]
+    assert kept == [each.step for each in stream.since(first)]
+    if first:
+        with pytest.raises(InputError, match=f"from step {first} on are kept, not from step"):
+            stream.since(first - 1)
 
 
 def test_a_function_listens_and_stays_behind_when_a_stream_is_copied():
-    heard: list[Event] = []
+    heard = []
     sink = Sink()
     stream = EventStream([sink])
     stream.listeners.append(Listener(heard.extend, {event(1).event}))
@@ -139,7 +123,7 @@ def test_a_kind_is_its_text():
 # --- In runs -----------------------------------------------------------------------------------
 
 
-def listened(content: dict[str, Any], **settings: Any) -> tuple[list[Event], Any]:
+def listened(content, **settings):
     """Return what a sink of its own hears of a whole run, and the run."""
     simulation, sink = fleet2d.Simulation(content, **settings), Sink()
     simulation._state.events.sinks.append(sink)
@@ -147,7 +131,7 @@ def listened(content: dict[str, Any], **settings: Any) -> tuple[list[Event], Any
     return [event for events in sink.taken for event in events], stored
 
 
-def rows(stored: Any) -> list[tuple[Any, ...]]:
+def rows(stored):
     """Return the table of events as events."""
     columns = table(stored, "events")
     detail = [
@@ -175,25 +159,3 @@ def test_the_table_is_in_order_of_step_entity_and_rank():
     keys = [(step, order.index(who), event(0, kind).rank) for step, who, kind, _ in rows(stored)]
     assert keys == sorted(keys)
     assert {"shut", "opened"} <= {kind for _, _, kind, _ in rows(stored)}
-
-
-def test_every_kind_of_the_table_is_known_or_a_behavior_s_own():
-    kinds = set(table(run(everything("1 h")), "events")["event"])
-    assert {"reacts", "obeys", "user_seen"} <= kinds
-    assert kinds - {*EventKind} == {"obeys"}
-
-
-def test_events_since_a_step_are_the_rows_of_the_table_from_then_on():
-    simulation = fleet2d.Simulation(everything("20 min"))
-    simulation.advance(700)
-    state = simulation._state
-    state.settle(simulation.step)
-    known = [tuple(e) for e in state.events.since(300)]
-    expected = [row for row in rows(run(everything("20 min"))) if 300 <= row[0] < 700]
-    assert sorted(expected) == sorted(known)
-    assert np.all(np.diff([step for step, *_ in known]) >= 0)
-
-
-def test_who_is_away_and_who_has_no_camera_is_heard_of_too():
-    heard, _ = listened(scenario("10 min", users={"ana": {"type": "meander"}}))
-    assert [] == heard

@@ -2,9 +2,7 @@
 
 import copy
 import io
-from typing import Any
 
-import numpy as np
 import pytest
 from tests.scenes import AGENDA, digests, scenario, table
 
@@ -16,7 +14,7 @@ DOOR = {"bath_door": {"type": "door", "doorway": "bathroom_1"}}
 SENSOR = {"contact": {"type": "contact_sensor", "of": "bath_door"}}
 
 
-def home(script: list[dict[str, Any]], duration: str = "1 h", **more: Any) -> dict[str, Any]:
+def home(script, duration="1 h", **more):
     """A person with an agenda, one who walks about, and a robot that can be called."""
     behaviors = [{"type": "come", "stay": "2 min"}, {"type": "find"}, {"type": "patrol"}]
     return scenario(
@@ -44,7 +42,7 @@ LIVELY = [
 ]
 
 
-def acts(run: fleet2d.Run) -> list[tuple[int, str, str]]:
+def acts(run):
     return [(act["step"], act["do"], act["by"]) for act in run.manifest["interventions"]]
 
 
@@ -105,41 +103,12 @@ def test_copies_keep_what_a_script_still_waits_for(lively, way):
     assert lively.manifest["interventions"] == twin.finish().manifest["interventions"]
 
 
-def test_a_run_that_was_interrupted_goes_on_with_its_script(lively, tmp_path):
-    run = fleet2d.Simulation(home(LIVELY), out=tmp_path / "run")
-    run.advance(1000)
-    run.finish()
-    assert lively.digest == fleet2d.resume(tmp_path / "run").digest
-
-
-def test_nobody_else_changes_by_what_is_done_to_one():
-    script = [
-        {"at": "5 min", "put": "ben", "to": "bedroom"},
-        {"at": "6 min", "send": "ben", "to": "living_room", "duration": "3 min"},
-        {"at": "20 min", "away": "ben", "duration": "5 min"},
-    ]
-    plain, scripted = fleet2d.run(home([])), fleet2d.run(home(script))
-    one, other = (table(run, "trajectories", entity="ana") for run in (plain, scripted))
-    for column in ("x", "y", "heading"):
-        np.testing.assert_array_equal(one[column], other[column])
-
-
 def test_a_scenario_without_a_script_waits_for_nothing():
     run = fleet2d.Simulation(home([]))
     interventions = run._state.interventions
     assert interventions.next_due() is None
     assert interventions not in run._state.events.sinks
     assert frozenset() == run._state.awaited
-
-
-def test_an_entry_on_an_event_is_done_once_unless_each_time_is_wanted():
-    script = [
-        {"on": "user_seen", "replan": "ben"},
-        {"on": "user_seen", "each": True, "replan": "ben"},
-    ]
-    done = acts(fleet2d.run(home(script)))
-    assert 1 == sum(by == "script.0" for _, _, by in done)
-    assert 1 < sum(by == "script.1" for _, _, by in done)
 
 
 @pytest.mark.parametrize(

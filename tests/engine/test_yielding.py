@@ -2,8 +2,6 @@
 
 import json
 from itertools import combinations
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,31 +11,29 @@ from tests.scenes import scenario as of_ghosts
 from tests.thorough import some
 
 import fleet2d
-from fleet2d.engine.yielding import Yielding
 from fleet2d.entities.behavior import Situation
 from fleet2d.errors import ScenarioError
-from fleet2d.runs.run import Run
 from fleet2d.runtime.determinism import Draws
 
 WALK = {"type": "tests.own_components:Scripted"}
 
 
-def scenario(duration: str, **sections: Any) -> dict[str, Any]:
+def scenario(duration, **sections):
     """A scenario in the flat, in which robots yield."""
     simulation = {"ghosts": False} | sections.pop("simulation", {})
     return of_ghosts(duration, simulation=simulation, **sections)
 
 
-def robot(start: Any, *script: Any, **more: Any) -> dict[str, Any]:
+def robot(start, *script, **more):
     """A robot that follows a script: places, and times to stay [s]."""
     return {**WALK, "start": start, "script": list(script), "camera": None, **more}
 
 
-def person(start: Any, *script: Any, **more: Any) -> dict[str, Any]:
+def person(start, *script, **more):
     return {**WALK, "start": start, "script": list(script), "speed": 1.0, **more}
 
 
-def nearest(stored: Run, one: str, other: str, since: int = 0) -> float:
+def nearest(stored, one, other, since=0):
     """The smallest gap between two bodies at home, from the stored paths; below 0 they overlap [m]."""
     a, b = path(stored, one), path(stored, other)
     here = (np.asarray(a.away) == 0) & (np.asarray(b.away) == 0)
@@ -46,23 +42,23 @@ def nearest(stored: Run, one: str, other: str, since: int = 0) -> float:
     return float(gaps.min(initial=np.inf))
 
 
-def radius(stored: Run, name: str) -> float:
+def radius(stored, name):
     config = stored.manifest["scenario"]
     return {**config["users"], **config["robots"]}[name]["radius"]  # type: ignore[no-any-return]
 
 
-def told(stored: Run, *kinds: str) -> list[tuple[int, str, str, str]]:
+def told(stored, *kinds):
     rows = stored.pandas("events")
     rows = rows[rows["event"].isin(kinds)]
     return list(zip(rows["step"], rows["event"], rows["entity"], rows["detail"], strict=True))
 
 
-def ends_at(stored: Run, name: str) -> tuple[float, float]:
+def ends_at(stored, name):
     way = path(stored, name)
     return round(float(way.x[-1]), 2), round(float(way.y[-1]), 2)
 
 
-def corridor(tmp_path: Path, width: float = 0.5) -> dict[str, Any]:
+def corridor(tmp_path, width=0.5):
     """Two rooms, and a corridor of five metres between them, through which one robot fits."""
     low, high = 1.5 - width / 2, 1.5 + width / 2
     outline = [[0, 0], [3, 0], [3, low], [8, low], [8, 0], [11, 0], [11, 3], [8, 3], [8, high], [3, high], [3, 3], [0, 3]]  # fmt: skip
@@ -92,13 +88,6 @@ def test_two_robots_that_go_to_one_spot_stop_beside_each_other(people_block):
     assert 0 <= nearest(stored, "butler", "guard")
     assert ends_at(stored, "butler") == (3.0, 3.0)
     assert np.hypot(*(np.array(ends_at(stored, "guard")) - 3)) < 0.6
-
-
-def test_ghosts_pass_through_each_other():
-    robots = {"butler": robot([1, 3], [4, 3], 60.0), "guard": robot([2.5, 3])}
-    stored = run(scenario("1 min", robots=robots, simulation={"ghosts": True}))
-    assert nearest(stored, "butler", "guard") < 0
-    assert not told(stored, "gives_way", "overlaps")
 
 
 def test_robots_that_are_drawn_begin_apart():
@@ -188,7 +177,7 @@ def test_what_a_log_forces_is_counted_and_told(tmp_path):
 
 
 def test_who_yields_is_a_rule_that_can_be_replaced():
-    def yields(rule: Any) -> set[str]:
+    def yields(rule):
         battery = {"driving": "2 h", "standing": "10 h", "charging": "3 h", "charger": [1, 1]}
         robots = {
             "butler": robot([1, 3], [4, 3], 60.0, battery=battery),
@@ -205,7 +194,7 @@ def test_who_yields_is_a_rule_that_can_be_replaced():
         yields("low_batery")
 
 
-def yielding_of(simulation: fleet2d.Simulation) -> Yielding:
+def yielding_of(simulation):
     """What lets the robots of a run yield."""
     found = simulation._state.yielding
     assert found is not None
@@ -242,10 +231,10 @@ def test_who_goes_first_drives_round_another_one_that_stands():
 # --- Random homes ------------------------------------------------------------------------------
 
 
-def random_scenario(number: int) -> dict[str, Any]:
+def random_scenario(number):
     """One to ten robots, none to six people, doors and interventions, in the flat."""
     draws = Draws(np.uint64(51), number)
-    behaviors: list[dict[str, Any]] = [
+    behaviors = [
         {"type": "patrol", "dwell": "5 s"},
         {"type": "patrol", "dwell": "1 min", "order": "random"},
         {"type": "meander"},
@@ -261,9 +250,9 @@ def random_scenario(number: int) -> dict[str, Any]:
         }
         for i in range(1 + draws.below(10))
     }
-    users: dict[str, Any] = {}
+    users = {}
     for i in range(draws.below(7)):
-        kinds: list[dict[str, Any]] = [
+        kinds = [
             {"type": "meander", "speed": 0.7},
             {"type": "room_sampling", "shares": {"kitchen": 0.5, "living_room": 0.5}},
             person([1.0, 3.0], 5.0, [7.0, 3.1], 20.0, [1.0, 1.0], 600.0),

@@ -11,9 +11,7 @@ START = datetime(2026, 1, 5, 8)
 DAY = timedelta(days=1)
 
 
-def lived(
-    attitude: Attitude, days: int, outcome: Outcome, willingness: float = 0.5, each: int = 1
-) -> AttitudeState:
+def lived(attitude, days, outcome, willingness=0.5, each=1):
     state = attitude.begin(START)
     for day in range(days):
         for number in range(each):

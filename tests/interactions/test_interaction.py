@@ -1,7 +1,6 @@
 """Interactions as data: when requests come up, what they are worth, and what becomes of them."""
 
 from datetime import datetime, timedelta
-from typing import Any
 
 import pytest
 from tests.scenes import scenario
@@ -12,10 +11,10 @@ from fleet2d.scenario.load import load_scenario
 
 MONDAY = datetime(2026, 1, 5)
 HOUR, MINUTE = timedelta(hours=1), timedelta(minutes=1)
-PILL: dict[str, Any] = {"do": "remind", "to": "ana", "at": ["20:00", "08:00"], "worth": 4}
+PILL = {"do": "remind", "to": "ana", "at": ["20:00", "08:00"], "worth": 4}
 
 
-def queue(**changes: Any) -> RequestQueue:
+def queue(**changes):
     return RequestQueue({"pill": Interaction(**(PILL | changes))}, MONDAY)
 
 
@@ -105,6 +104,8 @@ def test_an_answer_settles_a_request(outcome, tries, ready_after):
         ({"by": "astra"}, "there is no robot 'astra': did you mean 'astro'?"),
         ({"do": "ask", "about": "anna"}, "pill.about: there is no user 'anna': did you mean"),
         ({"do": "nag"}, "'remind', 'offer'"),
+        ({"fetch_from": "ben"}, "'fetch_from' is for `do: deliver`"),
+        ({"do": "deliver", "fetch_from": "ana"}, "'fetch_from' is for `do: deliver`"),
         ({"at": [], "every": "1 us"}, "interactions.pill.every: expected a step (1 s) or more"),
         ({"on": "feast"}, "interactions.pill.on"),
     ],

@@ -11,7 +11,7 @@ from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.interventions import Configure
 
 
-def simulation() -> fleet2d.Simulation:
+def simulation():
     return fleet2d.Simulation("bundled:paper", "simulation.duration=10 h", seed=4)
 
 

@@ -1,7 +1,5 @@
 """What is done to algorithms and sensors, beside the same run in which nothing is done."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from tests.scenes import OWN, scenario, table
@@ -11,7 +9,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.interventions import ReplaceOutput, ResetAlgorithm, Restore
 
 
-def home(*script: dict[str, Any]) -> dict[str, Any]:
+def home(*script):
     return scenario(
         "1 h",
         users={"ana": {"type": "meander"}},
@@ -28,7 +26,7 @@ def home(*script: dict[str, Any]) -> dict[str, Any]:
     )
 
 
-def shares(run: fleet2d.Run, name: str) -> Any:
+def shares(run, name):
     rows = table(run, name)
     return rows["share" if name == "share" else "mean"].reshape(6, -1)
 
@@ -70,7 +68,7 @@ def test_an_output_may_be_withheld_or_stay_as_it_is():
     assert (before != run.outputs["share"].share).any()
 
 
-def readings(run: fleet2d.Run) -> list[tuple[int, str]]:
+def readings(run):
     rows = table(run, "sensors")
     return list(zip(rows["step"].tolist(), rows["state"].tolist(), strict=True))
 

@@ -1,7 +1,6 @@
 """When something of a script is done: times as people write them, and events."""
 
 from datetime import datetime, timedelta
-from typing import Any
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
@@ -10,8 +9,8 @@ from fleet2d.interventions.intervention import ClockTime, On, Trigger, When, par
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 
-WHEN: TypeAdapter[Any] = TypeAdapter(When)
-ON: TypeAdapter[Any] = TypeAdapter(On)
+WHEN = TypeAdapter(When)
+ON = TypeAdapter(On)
 # A week from Monday noon on.
 CLOCK = Clock(datetime(2026, 1, 5, 12), 1_000_000, 7 * 86_400)
 

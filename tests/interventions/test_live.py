@@ -1,13 +1,11 @@
 """What arrives from outside, as interventions: detections, readings; recorded and repeated."""
 
-from typing import Any
-
 import pytest
 
 import fleet2d
 from fleet2d.errors import InputError
 
-LIVE: dict[str, Any] = {
+LIVE = {
     "extends": "bundled:paper",
     "simulation": {"duration": "10 min", "seed": 4},
     "users": {"ana": {"type": "live"}},
@@ -16,11 +14,11 @@ LIVE: dict[str, Any] = {
 }
 
 
-def place(room: str) -> tuple[float, float]:
+def place(room):
     return next(r.anchor_xy for r in fleet2d.load_floorplan().rooms if r.name == room)
 
 
-def drive(simulation: fleet2d.Simulation) -> None:
+def drive(simulation):
     x, y = place("kitchen_1")
     simulation.do({"put": "ana", "to": [x, y]})
     for k in range(3):

@@ -2,7 +2,6 @@
 
 import random
 from datetime import timedelta
-from typing import Any
 
 import pytest
 from tests.scenes import digests
@@ -23,7 +22,7 @@ KEPT_OUT = {
 }
 
 
-def events(run: Any, kind: str) -> list[tuple[int, str]]:
+def events(run, kind):
     rows = run.tables["events"].to_pylist()
     return [(row["step"], row["detail"]) for row in rows if row["event"] == kind]
 
@@ -126,44 +125,44 @@ KINDS = ("kitchen", "bedroom", "bathroom", "office", "living_room", "hallway", "
 class Chance:
     """Draws interventions of all kinds, most of which are possible in the home."""
 
-    def __init__(self, seed: int, simulation: fleet2d.Simulation) -> None:
+    def __init__(self, seed, simulation):
         self.random, self.simulation = random.Random(seed), simulation
         home = simulation.home
         self.rooms = [room.name for room in home.rooms]
         self.furniture = [item.name for item in home.objects]
 
-    def one(self, *values: Any) -> Any:
+    def one(self, *values):
         return self.random.choice(values)
 
-    def point(self) -> list[float]:
+    def point(self):
         room = self.random.choice(self.simulation.home.rooms)
         x, y = room.anchor_xy
         return [x + self.random.uniform(-2, 2), y + self.random.uniform(-2, 2)]
 
-    def place(self) -> Any:
+    def place(self):
         return self.one(self.point(), self.one(*self.rooms), self.one(*KINDS), "sofa", "bed")
 
-    def robot(self) -> str:
+    def robot(self):
         return str(self.one("astro", "bolt", "live"))
 
-    def user(self) -> str:
+    def user(self):
         return str(self.one("ana", "ben", "gina"))
 
-    def body(self) -> str:
+    def body(self):
         return str(self.one(self.user(), self.robot()))
 
-    def lasting(self) -> dict[str, Any]:
+    def lasting(self):
         return self.one({}, {"duration": "1 s"}, {"duration": "3 min"}, {"duration": "20 min"})
 
-    def corners(self) -> list[list[float]]:
+    def corners(self):
         x, y = self.point()
         return [[x, y], [x + 2, y], [x + 2, y + 1], [x, y + 1]]
 
-    def plan(self, name: str) -> dict[str, Any]:
+    def plan(self, name):
         plan = self.simulation.plan(name).turn_by(0.5).stay(timedelta(seconds=40))
         return dict(data_of(plan))
 
-    def keys(self) -> dict[str, Any]:
+    def keys(self):
         return self.one(
             {"behavior": "patrol", "keys": {"dwell": self.one("1 s", "5 min")}},
             {"behavior": "hangout", "keys": {"no_stops_in": [self.one(*KINDS)]}},
@@ -171,7 +170,7 @@ class Chance:
             {"behavior": "routine", "keys": {"persona": "retired"}},
         )
 
-    def fields(self, verb: str) -> dict[str, Any]:
+    def fields(self, verb):
         """The fields of an intervention, with its subject under its verb."""
         draw = {
             "put": lambda: {"put": self.body(), "to": self.place()},
@@ -270,7 +269,7 @@ class Chance:
         }  # fmt: skip
         return dict(draw[verb]())
 
-    def when(self) -> dict[str, Any]:
+    def when(self):
         """When it happens: now; at a time; or at events, which others may have made impossible."""
         minute = self.simulation.step // 60 + self.random.randrange(1, 30)
         return self.one(

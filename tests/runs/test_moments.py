@@ -69,18 +69,6 @@ def test_poses_of_a_part_are_those_of_the_run(run_dir, first, end):
             assert np.array_equal(getattr(complete, values)[first:end], getattr(cut, values))
 
 
-def test_random_walk_can_be_cut():
-    run = fleet2d.run(
-        {
-            "simulation": {"duration": "2 h", "start": "2026-01-05", "seed": 1},
-            "floorplan": {"type": "bundled"},
-            "users": {"ana": {"type": "meander"}},
-        }
-    )
-    part = part_of_run(run, 4000, 6000)
-    assert run.path("ana", SECOND).x[4000:6000].tolist() == part.path("ana", SECOND).x.tolist()
-
-
 def test_rows_outside_are_left_out_and_steps_count_from_zero(run_dir):
     run = fleet2d.open_run(run_dir)
     part = part_of_run(run, 3600, 7200)

@@ -2,7 +2,6 @@
 
 import itertools
 from functools import cache
-from typing import Any
 
 import pytest
 from tests.engine.test_power import BATTERY, PATROL, home
@@ -12,7 +11,6 @@ import fleet2d
 from fleet2d.engine.repeat import decisions_of
 from fleet2d.errors import InputError
 from fleet2d.runs.robot_log import LogEntry, day_of, log_lines, moves_of, robot_log
-from fleet2d.runs.run import Run
 
 SCRIPT = (
     {"at": "07:05", "power": "astro", "state": "crash", "duration": "2 min"},
@@ -23,7 +21,7 @@ SCRIPT = (
 
 
 @cache
-def stored(*, decisions: bool = True) -> Run:
+def stored(*, decisions=True):
     content = home(
         *SCRIPT, duration="40 h", astro={"battery": BATTERY, "behaviors": ["dock", PATROL]}
     )
@@ -31,7 +29,7 @@ def stored(*, decisions: bool = True) -> Run:
     return fleet2d.run(content)
 
 
-def log(first: int = 0, end: int = 7200, source: str = "", **more: Any) -> list[LogEntry]:
+def log(first=0, end=7200, source="", **more):
     entries = robot_log(stored(), "astro", first, end, **more)
     return [entry for entry in entries if source in ("", entry.source)]
 
@@ -71,7 +69,7 @@ def test_moves_are_those_of_its_path_whatever_part_is_read():
     assert begins == ends > 5
 
 
-def complex_steps(poses: Any) -> Any:
+def complex_steps(poses):
     """The steps of a path as complex numbers, whose absolute values are lengths."""
     places = poses.x + 1j * poses.y
     return places[1:] - places[:-1]

@@ -1,6 +1,5 @@
 """A stored run reads back, or says in plain words why not."""
 
-import json
 import sys
 
 import numpy as np
@@ -12,7 +11,7 @@ from tests.artifacts.tables import EVERY_KIND, rows_of_every_kind, stored
 from fleet2d.artifacts.arrow import spec_of
 from fleet2d.artifacts.store import RunStore
 from fleet2d.errors import ArtifactError, InputError, RunDirectoryError
-from fleet2d.runs.run import Run, open_run, open_store
+from fleet2d.runs.run import open_run, open_store
 
 ROWS = rows_of_every_kind(300)
 
@@ -91,15 +90,6 @@ def test_truncated_table_is_named_and_the_rest_opens(directory):
     assert ["every_kind"] == run.verify()
 
 
-def test_verify_sees_flipped_bytes(directory):
-    path = directory / "every_kind.parquet"
-    content = bytearray(path.read_bytes())
-    content[200:240] = bytes(40)
-    path.write_bytes(content)
-
-    assert ["every_kind"] == open_run(directory).verify()
-
-
 def test_verify_sees_a_changed_value_and_not_a_new_layout(directory):
     path = directory / "every_kind.parquet"
     table = open_run(directory).arrow("every_kind")
@@ -111,15 +101,6 @@ def test_verify_sees_a_changed_value_and_not_a_new_layout(directory):
     x[-1] = np.nextafter(x[-1], 2)
     pq.write_table(table.set_column(4, table.schema.field(4), [x]), path)
     assert ["every_kind"] == open_run(directory).verify()
-
-
-def test_verify_sees_a_changed_manifest(directory):
-    path = directory / "manifest.json"
-    content = json.loads(path.read_text())
-    content["digest"] = "0" * 64
-    path.write_text(json.dumps(content))
-
-    assert ["manifest.json"] == open_run(directory).verify()
 
 
 def test_missing_rows_are_noted(directory):
@@ -151,7 +132,7 @@ def test_run_before_close_is_refused():
 
 
 def test_run_says_where_and_how(directory):
-    run: Run = open_run(directory)
+    run = open_run(directory)
 
     assert f"<Run {directory}: complete, tables every_kind>" == repr(run)
 

@@ -3,7 +3,6 @@
 from dataclasses import fields
 from datetime import timedelta
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -11,14 +10,14 @@ import pytest
 from tests.thorough import some
 
 import fleet2d
-from fleet2d import Behavior, Plan, Run, Simulation, Situation
+from fleet2d import Behavior, Simulation
 from fleet2d.entities.entity import Robot
 from fleet2d.errors import ArtifactError
 from fleet2d.interventions import Put
 from fleet2d.runs.trajectory import PathReader, Trajectory
 
 TWO_ROOMS = {"order": "random", "dwell": "20 s", "rooms": ["living_room", "kitchen", "hallway"]}
-COMMUTER: dict[str, Any] = {
+COMMUTER = {
     "type": "schedule",
     "days": [
         {
@@ -43,10 +42,10 @@ class Greeter(Behavior):
 
     rooms: tuple[str, ...] = ("living_room", "kitchen", "bathroom", "office")
 
-    def start(self, actor: Any) -> None:
+    def start(self, actor):
         self.round = 0
 
-    def decide(self, now: Situation) -> Plan:
+    def decide(self, now):
         if any(event.event == "user_seen" for event in now.events):
             event = now.events[-1]
             return now.plan().go_to((event.x, event.y)).interrupt_on("user_lost")
@@ -62,11 +61,11 @@ class Greeter(Behavior):
 class Startled(Behavior):
     """Wander at random, and stand still for a moment when somebody comes into view."""
 
-    def start(self, actor: Any) -> None:
+    def start(self, actor):
         self.walk = actor.entity.behaviors[1].model_copy()
         self.walk.start(actor)
 
-    def decide(self, now: Situation) -> Plan:
+    def decide(self, now):
         if now.events:
             return now.plan().turn_by(0.4).stay(timedelta(seconds=4.5))
         plan = now.plan().meander(self.walk.rule)
@@ -76,14 +75,14 @@ class Startled(Behavior):
 class Stranger(Startled):
     """Wander by a rule that no behavior of its body has."""
 
-    def start(self, actor: Any) -> None:
+    def start(self, actor):
         self.walk = actor.entity.behaviors[1].model_copy(update={"turn_std_deg": 60.0})
         self.walk.start(actor)
 
 
 GREETER = {"behaviors": [{"type": f"{__name__}:Greeter"}]}
 STARTLED = {"behaviors": [{"type": f"{__name__}:Startled"}, {"type": "meander"}]}
-BODIES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+BODIES = {
     "schedule with away": ({"ana": COMMUTER}, {}),
     "schedule, seen on patrol": ({"ana": COMMUTER}, {"astro": {"type": "patrol", **TWO_ROOMS}}),
     "patrol without looking around": (
@@ -103,7 +102,7 @@ MOMENTS = {"midnight": "2026-01-05", "midday": "2026-01-05T11:57:03", "evening":
 
 
 @cache
-def run_of(bodies: str, start: str = "midnight", step: str = "1 s", *more: str) -> Run:
+def run_of(bodies, start="midnight", step="1 s", *more):
     """Run two hours and a bit, every step of it stored."""
     users, robots = BODIES[bodies]
     scenario = {
@@ -116,7 +115,7 @@ def run_of(bodies: str, start: str = "midnight", step: str = "1 s", *more: str) 
     return fleet2d.run(scenario, *more)
 
 
-def assert_rebuilt(run: Run, stride: int = 1) -> None:
+def assert_rebuilt(run, stride=1):
     """Compare the rebuilt path of every body with the stored poses."""
     stored = run.pandas("trajectories")
     step_us = run.manifest["step_us"]

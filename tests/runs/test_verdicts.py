@@ -1,7 +1,5 @@
 """The verdicts of a run in a line: what is violated comes first, and when."""
 
-from typing import Any
-
 import pyarrow as pa
 import pytest
 
@@ -15,7 +13,7 @@ UNTESTED = {"holds": None, "decided": True, "says": "it is untested"}
 VIOLATED = {"holds": False, "decided": True, "says": "it is violated"}
 
 
-def run_with(expectations: dict[str, Any], violations: list[tuple[str, int, int]]) -> Any:
+def run_with(expectations, violations):
     run = fleet2d.run("bundled:paper", "simulation.duration=10 s", seed=4)
     names, first, last = ([row[i] for row in violations] for i in range(3))
     table = pa.table({"expectation": names, "step": first, "last_step": last})

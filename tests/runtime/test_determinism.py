@@ -2,10 +2,8 @@
 
 import builtins
 import sys
-from collections.abc import Iterable
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -61,7 +59,7 @@ def test_successive_draws_of_one_step_are_even_and_independent():
 
 
 def test_every_order_of_a_shuffle_is_as_likely():
-    counts: dict[tuple[str, ...], int] = {}
+    counts = {}
     for step in range(6000):
         order = tuple(Draws(stream_key(2, "p", "q"), step).shuffled("abc"))
         counts[order] = counts.get(order, 0) + 1
@@ -103,10 +101,10 @@ def test_floats_are_added_one_after_the_other():
 )
 def test_a_run_adds_no_floats_by_the_built_in_sum(scenario, monkeypatch):
     """The mover's distance of the bundled month had another last digit in Python 3.13 than in 3.11."""
-    calls: set[str] = set()
+    calls = set()
     built_in = builtins.sum
 
-    def checked(values: Iterable[Any], start: Any = 0) -> Any:
+    def checked(values, start=0):
         total = built_in(values, start)
         caller = sys._getframe(1)
         if type(total) is float and caller.f_globals["__name__"].startswith("fleet2d"):

@@ -5,9 +5,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -79,7 +77,7 @@ def test_other_words_are_no_kinds(source):
     assert [] == list(bare_kinds(source))
 
 
-def bare_kinds(source: str) -> Iterator[tuple[int, str]]:
+def bare_kinds(source):
     """Yield the line and the text of each string that is a kind of event."""
     if not QUOTED.search(source):
         return
@@ -91,7 +89,7 @@ def bare_kinds(source: str) -> Iterator[tuple[int, str]]:
             yield from () if is_other_word else [(node.lineno, node.value)]
 
 
-def kinds_in(node: ast.AST) -> Iterator[ast.AST]:
+def kinds_in(node):
     """Yield all nodes of a place that holds kinds: a comparison, arguments, or a declaration."""
     if isinstance(node, ast.Compare) and name_of(node.left) == "event":
         yield from (each for side in node.comparators for each in ast.walk(side))
@@ -103,7 +101,7 @@ def kinds_in(node: ast.AST) -> Iterator[ast.AST]:
             yield from ast.walk(node.value)
 
 
-def name_of(node: ast.AST) -> str:
+def name_of(node):
     """Return the name of a variable, or the last one of an attribute."""
     return getattr(node, "attr", getattr(node, "id", ""))
 
@@ -119,7 +117,7 @@ def test_a_run_with_renamed_kinds_differs_in_their_names_only(tmp_path):
     assert json.loads(json.dumps(run.metrics)) == metrics
 
 
-def renamed_run(out: Path) -> Any:
+def renamed_run(out):
     """Return the kinds and metrics of a run of a process in which each kind has another name."""
     command = [sys.executable, "-c", RENAME, events.__file__, str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

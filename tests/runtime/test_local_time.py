@@ -7,7 +7,7 @@ from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
-from tests.change_nights import CHANGED_RULES, DAY, MINUTE, ZONES, Night, nights
+from tests.change_nights import CHANGED_RULES, DAY, MINUTE, ZONES, nights
 from tests.thorough import some
 
 from fleet2d.entities.behavior import parse_span
@@ -32,7 +32,7 @@ NIGHTS = [night for zone in ZONES for night in nights(zone)]
 NIGHTS += [night for zone, year in CHANGED_RULES for night in nights(zone, year)]
 
 
-def clock_of(night: Night, minutes: int = MINUTES) -> Clock:
+def clock_of(night, minutes=MINUTES):
     """Return the clock of a run of steps of a minute."""
     begin = night.begin.replace(tzinfo=None)
     zone = zone_of(night.zone, begin, begin + minutes * MINUTE)
@@ -68,7 +68,7 @@ def test_written_time_is_the_first_minute_that_reads_so_or_later_after_a_gap(nig
     readings = [night.reading(minute).replace(tzinfo=None) for minute in range(MINUTES)]
     first = readings[0]
     latest = max(readings)
-    at: dict[datetime, int] = {}
+    at = {}
     for minute, reading in enumerate(readings):
         at.setdefault(reading, minute)
     by_reading = sorted(at)

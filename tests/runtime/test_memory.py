@@ -33,7 +33,7 @@ def usual():
     gc.set_threshold(*before)
 
 
-def alive() -> int:
+def alive():
     return sum(isinstance(thing, Actor | Plan) for thing in gc.get_objects())
 
 
@@ -46,7 +46,7 @@ def test_what_a_run_was_made_of_is_freed_at_once(no_collector):
 
 
 def test_released_memory_is_that_of_garbage_too(no_collector):
-    loop: list[object] = [np.ones(10_000)]
+    loop = [np.ones(10_000)]
     loop.append(loop)
     array = weakref.ref(loop[0])
     del loop

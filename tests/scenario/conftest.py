@@ -75,7 +75,7 @@ class Tally(Component):
     of: str
 
 
-STAND_INS: dict[str, dict[str, type[Component]]] = {
+STAND_INS = {
     "sight": {"line_of_sight": LineOfSight},  # defaults that every scenario has
     "drive": {"differential": Differential},
     "right_of_way": {"listed": Listed},

@@ -1,8 +1,5 @@
 """Composition: extending files, overrides, and what a changed type leaves behind."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from fleet2d.configuration.components import kind_at
@@ -13,7 +10,7 @@ from fleet2d.scenario.model import Scenario
 
 pytestmark = pytest.mark.usefixtures("stand_ins")
 
-BASE: dict[str, Any] = {
+BASE = {
     "simulation": {"duration": {"days": 30}, "seed": 4},
     "floorplan": {"type": "houseexpo", "path": "plan.json", "cell": 0.1, "border": 2},
     "users": {"ana": {"type": "tour", "radius": 0.3, "stops": ["hall"]}, "ben": "drift"},
@@ -96,7 +93,7 @@ def test_override_that_makes_no_sense_is_refused(override, message):
     assert message in str(caught.value)
 
 
-def write(folder: Path, **files: str) -> Path:
+def write(folder, **files):
     for name, content in files.items():
         file = folder / f"{name}.yaml"
         file.parent.mkdir(exist_ok=True)
@@ -130,7 +127,7 @@ def test_extended_file_can_change_a_type(tmp_path):
 def test_class_that_stays_the_same_is_not_imported(tmp_path, monkeypatch):
     write(tmp_path, base="floorplan: {type: 'mine:House', width: 3}")
     write(tmp_path, home="extends: base.yaml\nfloorplan: {type: 'mine:House', cell: 0.1}")
-    looked_up: list[str] = []
+    looked_up = []
     monkeypatch.setattr(compose_module, "lookup", lambda _, name: looked_up.append(name))
 
     assert {"type": "mine:House", "width": 3, "cell": 0.1} == compose(tmp_path / "home.yaml").data[

@@ -4,13 +4,12 @@ import copy
 import json
 from datetime import date, datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from fleet2d.errors import ScenarioError
 from fleet2d.scenario.load import load_scenario
-from fleet2d.scenario.model import Scenario, SimulationSettings
+from fleet2d.scenario.model import SimulationSettings
 
 pytestmark = pytest.mark.usefixtures("stand_ins")
 
@@ -48,11 +47,11 @@ def home(tmp_path, monkeypatch):
     return folder / "home.yaml"
 
 
-def simulation(**settings: Any) -> SimulationSettings:
+def simulation(**settings):
     return SimulationSettings.model_validate({"duration": "1 h", **settings})
 
 
-def said(source: Any, *overrides: str, **settings: Any) -> str:
+def said(source, *overrides, **settings):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(source, *overrides, **settings)
     return str(caught.value)
@@ -190,7 +189,7 @@ def test_empty_scenario_names_what_is_missing():
 
 
 def test_scenario_is_frozen(home):
-    scenario: Scenario = load_scenario(home)
+    scenario = load_scenario(home)
 
     with pytest.raises(ValueError, match="frozen"):
         scenario.name = "x"

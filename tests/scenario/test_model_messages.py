@@ -35,7 +35,7 @@ class Outer(Settings):
     plain: timedelta = timedelta(0)
 
     @model_validator(mode="after")
-    def _judge(self) -> "Outer":
+    def _judge(self):
         if self.name == "bad":
             raise ValueError("a bad name")
         return self
