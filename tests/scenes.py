@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+import yaml
 from numpy.typing import NDArray
 
 import fleet2d
@@ -69,6 +70,26 @@ def write_flat(folder: Path) -> Path:
     path = folder / "flat.json"
     path.write_text(json.dumps(flat_document()))
     return path
+
+
+def write_plan(folder: Path, outline: Any, rooms: Mapping[str, Any], **more: Any) -> str:
+    """Write a floor plan of one outline, whose rooms have a type and a polygon each; return its path."""
+    document = {
+        "format": "fleet2d-floorplan",
+        "version": 1,
+        "name": "home",
+        "free": [{"outline": outline, "holes": []}],
+        "rooms": [{"type": kind, "polygon": polygon} for kind, polygon in rooms.items()],
+        **more,
+    }
+    path = folder / "home.json"
+    path.write_text(json.dumps(document))
+    return str(path)
+
+
+def box(*bounds: float) -> list[list[float]]:
+    """Return the corners of a box from (x, y) to (x, y)."""
+    return [list(corner) for corner in shapely.box(*bounds).exterior.coords[:-1]]
 
 
 @cache
@@ -168,6 +189,19 @@ def every_step(duration: str = "5 min") -> dict[str, Any]:
 def run(content: Mapping[str, Any], *overrides: str, **settings: Any) -> Run:
     """Run a scenario in memory."""
     return fleet2d.run(content, *overrides, **settings)
+
+
+def entries(text: str) -> list[Any]:
+    """Return entries of a script, one a line, as YAML has them between braces."""
+    return [yaml.safe_load(f"{{{line}}}") for line in text.strip().splitlines()]
+
+
+def unmet(content: Mapping[str, Any], expected: str, **settings: Any) -> list[str]:
+    """Run a scenario; return what those expectations say, one a line, that don't hold."""
+    lines = expected.strip().splitlines()
+    expect = {f"line_{number}": line.strip() for number, line in enumerate(lines, 1)}
+    verdicts = run({**content, "expect": expect}, **settings).manifest["expectations"]
+    return [verdict["says"] for verdict in verdicts.values() if verdict["holds"] is not True]
 
 
 def digests(stored: Run) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from typing import Any, ClassVar
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.scenes import digests, everything, run, scenario, table
 from tests.thorough import some
@@ -101,20 +102,16 @@ def test_every_table_is_the_same_when_watchers_take_in_few_steps_at_once(whole, 
 
 def test_rows_tell_false_from_true_and_who_from_whom(whole):
     rows = table(whole, "observations")
-    assert not any(room is None or room != room for room in rows["room"]), "also within walls"
+    assert not pd.isna(rows["room"]).any(), "also within walls"
     astro = rows["robot"] == "astro"
     assert {"front", "rear", "mast"} == set(rows["camera"][astro])
     assert {"camera"} == set(rows["camera"][~astro])
-    false = np.array([user is None or user != user for user in rows["true_user"]])
-    unknown = np.array([user is None or user != user for user in rows["user"]])
+    false, unknown = pd.isna(rows["true_user"]), pd.isna(rows["user"])
     assert false.any()
     assert unknown.any()
-    assert np.isnan(rows["true_x"][false]).all()
-    assert not np.isnan(rows["true_x"][~false]).any()
+    assert (np.isnan(rows["true_x"]) == false).all()
     assert (rows["user"] != rows["true_user"])[~false & ~unknown].any()
-    assert (np.diff(rows["step"]) >= 0).all()
     sharp = np.isin(rows["robot"], ["bolt", "drift"]) | (rows["camera"] == "rear")
-    assert sharp.any()
     for column in ("user", "x", "y", "heading", "posture"):
         assert (rows[column] == rows[f"true_{column}"])[sharp].all()
     off = np.hypot(rows["x"] - rows["true_x"], rows["y"] - rows["true_y"])[~sharp & ~false]
@@ -143,9 +140,9 @@ def test_where_nothing_errs_no_column_is_added_and_no_row_changes():
 
 def test_events_are_about_whom_somebody_was_taken_for(whole):
     """Somebody unknown is seen, too; the event names nobody then."""
-    events = table(whole, "events", entity="curio")
-    who = {user if isinstance(user, str) else None for user in events["user"]}
-    assert {"ana", "ben", None} == who
+    users = table(whole, "events", entity="curio")["user"]
+    assert {"ana", "ben"} == set(users[~pd.isna(users)])
+    assert pd.isna(users).any()
 
 
 def test_algorithms_get_what_was_perceived_and_metrics_the_truth_beside_it():
@@ -155,21 +152,15 @@ def test_algorithms_get_what_was_perceived_and_metrics_the_truth_beside_it():
     Both.seen.clear()
     stored = run(content)
     rows = table(stored, "observations")
-    told = [part for part, _, _ in Both.seen]
-    for column in ("activity", "true_activity"):  # as pandas has it, what is missing is NaN
-        rows[column] = np.where(rows[column] != rows[column], None, rows[column])
+    told, truths, _ = zip(*Both.seen, strict=True)
     for column in ("step", "x", "y", "heading", "activity"):
-        expected = rows[column].tolist()
-        assert expected == np.concatenate([getattr(o, column) for o in told]).tolist()
-        assert expected == np.concatenate([getattr(o, column) for o in Peek.seen]).tolist()
-    activities = {name for name in rows["activity"] if name is not None}
-    assert {"wash", "read", "breakfast"} <= activities
-    assert rows["true_activity"].tolist() == [
-        name for _, truth, _ in Both.seen for name in truth.activity
-    ]
-    assert rows["true_x"][~np.isnan(rows["true_x"])].tolist() == [
-        x for _, truth, _ in Both.seen for x, u in zip(truth.x, truth.user, strict=True) if u >= 0
-    ]
+        expected = ["" if each is None or each != each else each for each in rows[column]]
+        for parts in (told, Peek.seen):
+            handed = np.concatenate([getattr(part, column) for part in parts]).tolist()
+            assert expected == ["" if each is None else each for each in handed]
+    assert {"wash", "read", "breakfast"} <= set(rows["activity"])
+    true = np.concatenate([truth.x[truth.user >= 0] for truth in truths])
+    assert rows["true_x"][~np.isnan(rows["true_x"])].tolist() == true.tolist()
 
 
 def test_looks_and_rows_agree():
@@ -204,14 +195,11 @@ def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing():
         ({"camera": {}, "cameras": {"a": {}}}, ["robots.r.cameras", "'camera' or 'cameras'"]),
         ({"camera": {"period": "10 s"}}, ["period", "10 s is longer than lost_after"]),
         ({"camera": {"period": "1.5 s"}}, ["robots.r", "not a multiple of simulation.step"]),
-        ({"camera": {"pan": {"headings_deg": []}}}, ["pan.headings_deg"]),
         (
             {"perception": {"detection": {"distance": [[2, 1], [1, 0]]}}},
             ["distance", "must ascend"],
         ),
-        ({"perception": {"detection": {"distance": 1.2}}}, ["distance", "0 to 1"]),
         ({"perception": {"detection": {"light": [[-2, 1], [26, 0]]}}}, ["light", "-2", "0 to 24"]),
-        ({"perception": {"detection": {"range": 3}}}, ["unknown key 'range'"]),
         (
             {"perception": {"identity": {"confusion": {"ana": {"ana": 1}}}}},
             ["confusion.ana", "leave it out"],

@@ -2,23 +2,16 @@
 
 import numpy as np
 import pytest
-from tests.scenes import TESTS, digests, everything, flat_path, run, scenario, table
+from tests.scenes import TESTS, digests, everything, run, scenario, table
 from tests.thorough import some
 
 import fleet2d
 from fleet2d import Behavior
-from fleet2d._core import camera_pose
-from fleet2d.engine.cameras import points_seen
 from fleet2d.errors import ComponentError, Fleet2DError, InputError
-from fleet2d.floorplan.home import Home
-from fleet2d.kernels import PoseBlock, Poses, Reach
 from fleet2d.sight import cached_fov
-from fleet2d.sight.cached_fov import Flashlight, VisibilityPolygon
-from fleet2d.sight.camera import Camera, TableContext, stack_lenses
-from fleet2d.sight.fov import FieldOfView, LineOfSight
+from fleet2d.sight.fov import FieldOfView
 
 HERE = f"{TESTS.as_posix()}/engine/test_cameras_points"
-SECOND = 1_000_000
 ODD = {
     "range": [0.3, 5], "angle_deg": 140, "offset": [0.1, -0.04], "heading_deg": 30, "body_points": 6,
     "pan": {"headings_deg": [-60, 0, 60], "dwell": "7 s"},
@@ -140,64 +133,6 @@ def test_own_method_that_fails_is_blamed(method, why):
     content = scenario("1 min", users={"ana": {"start": [2, 3.5]}}, robots={"astro": robot})
     with pytest.raises(ComponentError, match=why):
         run({**content, "sight": {"method": {"type": f"{HERE}:{method}"}}})
-
-
-# --- The slow twin ---------------------------------------------------------------------------
-
-
-def seen_one_by_one(method, home, lenses, robot, crowd, first):
-    """Return what `points_seen` does, asking about every body in every step."""
-    cameras, bodies = lenses.widest.shape
-    seen = np.zeros((cameras, bodies, len(robot.x)), np.uint64)
-    for c in range(cameras):
-        reach = Reach(
-            *(int(v[c]) for v in (lenses.near_squared, lenses.far_squared, lenses.half_angle))
-        )
-        for j in range(len(robot.x)):
-            if robot.away[j] or (first + j) % lenses.period[c]:
-                continue
-            pose = (int(robot.x[j]), int(robot.y[j]), int(robot.heading[j]))
-            eye = [int(v) for v in camera_pose(lenses, c, *pose, (first + j) * SECOND)]
-            for u in range(bodies):
-                if not crowd.away[u, j]:
-                    points = lenses.bodies[c, u, : int(lenses.points[c]) + 1]
-                    points = points + np.array([crowd.x[u, j], crowd.y[u, j]])
-                    in_view = method.sees(home, *eye, reach, points).tolist()
-                    seen[c, u, j] = sum(2**i for i, sees in enumerate(in_view) if sees)
-    return seen
-
-
-def wandering(rng, home, bodies, steps):
-    """Return poses (4, bodies, steps) of bodies that stand, walk, jump, and are away at times."""
-    cells = home.plan.lattice.cell_centre(*np.argwhere(home.plan.free).T)
-    spots = np.stack(cells)[:, rng.integers(0, len(cells[0]), (bodies, 6))]
-    at = np.repeat(rng.integers(0, 6, (bodies, steps)), 3, axis=1)[:, :steps]
-    xy = np.take_along_axis(spots, at[None], axis=2) + rng.choice(
-        [0, 0, 0, 7, -20], (2, bodies, steps)
-    )
-    heading = np.repeat(rng.integers(0, 4096, (bodies, steps)), 4, axis=1)[:, :steps]
-    return xy[0], xy[1], heading, (rng.random((bodies, steps)) < 0.1).astype(np.uint8)
-
-
-@pytest.mark.parametrize(
-    "method", [LineOfSight(), VisibilityPolygon(), Flashlight(), XRay()], ids=repr
-)
-@pytest.mark.parametrize("first", [0, 5])
-def test_points_seen_are_those_of_asking_about_everybody_each_time(method, first):
-    home = Home(fleet2d.load_floorplan(flat_path()))
-    cameras = [Camera.model_validate(c) for c in (ODD, {"period": "3 s"}, {"angle_deg": 330})]
-    scene = TableContext(["a", "b", "c"], [256.0] * 3, home.plan.lattice, SECOND, "robots.r")
-    lenses = [c.lens(home.plan.lattice.units_per_m, SECOND) for c in cameras]
-    stacked = stack_lenses(lenses, [False] * 3, scene)
-    rng = np.random.default_rng(first)
-    poses = wandering(rng, home, 4, 40)
-    robot = Poses(*(np.ascontiguousarray(column[0]) for column in poses))
-    crowd = PoseBlock(*(column[1:] for column in poses), np.zeros((3, 40), np.int8))
-
-    expected = seen_one_by_one(method, home, stacked, robot, crowd, first)
-
-    assert np.array_equal(expected, points_seen(method, home, stacked, robot, crowd, first, SECOND))
-    assert (expected > 0).sum() > 10
 
 
 # --- Users who look --------------------------------------------------------------------------

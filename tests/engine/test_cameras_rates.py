@@ -6,12 +6,11 @@ the file within 4.5 standard deviations of the binomial, in each bin of what the
 a sign error of the bearing, a wrong unit or a transposed confusion would be far outside.
 """
 
-import json
 from functools import cache
 
 import numpy as np
 import pytest
-from tests.scenes import OWN, table
+from tests.scenes import OWN, box, table, write_plan
 from tests.sight.watching import agree
 
 import fleet2d
@@ -22,7 +21,7 @@ USERS = ("ana", "ben")
 
 SCENARIO = f"""
 simulation: {{start: 2026-01-05, duration: 20 h, step: {STEP_S} s, seed: 11, ghosts: true}}
-floorplan: {{type: native, path: hall.json}}
+floorplan: {{type: native, path: home.json}}
 users:
   ana: {{type: "{OWN}:Fidget"}}
   ben: {{type: "{OWN}:Fidget"}}
@@ -54,17 +53,8 @@ robots:
 def folder(tmp_path_factory):
     """Return a folder with the scenario and its home: a hall of 10 m by 10 m."""
     made = tmp_path_factory.mktemp("hall")
-    outline = [[0, 0], [10, 0], [10, 10], [0, 10]]
-    (made / "hall.json").write_text(
-        json.dumps(
-            {
-                "format": "fleet2d-floorplan", "version": 1, "name": "hall",
-                "free": [{"outline": outline, "holes": []}],
-                "rooms": [{"type": "hall", "polygon": outline}],
-                "entrance": [0.5, 0.5],
-            }
-        )
-    )  # fmt: skip
+    hall = box(0, 0, 10, 10)
+    write_plan(made, hall, {"hall": hall}, entrance=[0.5, 0.5])
     (made / "scenario.yaml").write_text(SCENARIO)
     return made
 
@@ -164,7 +154,7 @@ def test_false_positives_of_a_camera_before_a_wall_come_at_their_rate(folder):
     }  # fmt: skip
     content = {
         "simulation": {"start": "2026-01-05", "duration": "10 h", "seed": 4, "step": "2 s"},
-        "floorplan": {"type": "native", "path": str(folder / "hall.json")},
+        "floorplan": {"type": "native", "path": str(folder / "home.json")},
         "users": {"ana": {"type": "guest"}},
         "robots": {"astro": robot},
     }

@@ -1,12 +1,11 @@
 """Doors, furniture and rooms that change during a run: exactly, in any span, seen by everybody."""
 
-import json
 from datetime import timedelta
 
 import numpy as np
 import pytest
 import shapely
-from tests.scenes import digests, run, scenario, table
+from tests.scenes import box, digests, run, scenario, table, write_plan
 from tests.thorough import some
 
 import fleet2d
@@ -16,47 +15,28 @@ from fleet2d.floorplan.home import HomeChange, HomeChanges
 from fleet2d.interventions import MoveFurniture
 from fleet2d.kernels import Breakpoints
 
+OUTLINE = [
+    [0, 0], [4, 0], [4, 1], [4.1, 1], [4.1, 0], [8, 0], [8, 2], [8.1, 2], [8.1, 0], [11, 0],
+    [11, 3], [8.1, 3], [8.1, 2.8], [8, 2.8], [8, 3], [4.1, 3], [4.1, 1.9], [4, 1.9], [4, 3], [0, 3],
+]  # fmt: skip
+CART = {"name": "cart", "type": "table", "footprint": box(6, 0.1, 6.5, 0.6), "blocks": "sight"}
 
-def flat():
+
+def write_three_rooms(folder, *objects):
     """Three rooms in a row, with a door line in each of the two gaps, and a cart in the middle."""
-    return {
-        "format": "fleet2d-floorplan",
-        "version": 1,
-        "name": "three rooms",
-        "free": [
-            {
-                "outline": [
-                    [0, 0], [4, 0], [4, 1], [4.1, 1], [4.1, 0], [8, 0], [8, 2], [8.1, 2],
-                    [8.1, 0], [11, 0], [11, 3], [8.1, 3], [8.1, 2.8], [8, 2.8], [8, 3], [4.1, 3],
-                    [4.1, 1.9], [4, 1.9], [4, 3], [0, 3],
-                ]
-            }
-        ],
-        "rooms": [
-            {"type": "kitchen", "polygon": [[0, 0], [4.05, 0], [4.05, 3], [0, 3]]},
-            {"type": "hallway", "polygon": [[4.05, 0], [8.05, 0], [8.05, 3], [4.05, 3]]},
-            {"type": "bathroom", "polygon": [[8.05, 0], [11, 0], [11, 3], [8.05, 3]]},
-        ],
-        "doorways": [
-            {"start": [4.05, 1.0], "end": [4.05, 1.9]},
-            {"start": [8.05, 2.0], "end": [8.05, 2.8]},
-        ],
-        "objects": [
-            {
-                "name": "cart",
-                "type": "table",
-                "footprint": [[6, 0.1], [6.5, 0.1], [6.5, 0.6], [6, 0.6]],
-                "blocks": "sight",
-            }
-        ],
-    }  # fmt: skip
+    rooms = {
+        "kitchen": box(0, 0, 4.05, 3),
+        "hallway": box(4.05, 0, 8.05, 3),
+        "bathroom": box(8.05, 0, 11, 3),
+    }
+    lines = [([4.05, 1.0], [4.05, 1.9]), ([8.05, 2.0], [8.05, 2.8])]
+    doorways = [{"start": start, "end": end} for start, end in lines]
+    return write_plan(folder, OUTLINE, rooms, doorways=doorways, objects=[CART, *objects])
 
 
-@pytest.fixture
-def plan(tmp_path):
-    path = tmp_path / "flat.json"
-    path.write_text(json.dumps(flat()))
-    return str(path)
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    return write_three_rooms(tmp_path_factory.mktemp("rooms"))
 
 
 def home(plan, duration="2 h", **sections):

@@ -118,32 +118,6 @@ def test_spans_do_not_show_where_bodies_block_each_other(span):
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
-def test_a_family_lives_its_day():
-    """Seats, beds, doors and needs: nobody gets stuck, and days go on as they were planned."""
-    member = {
-        "type": "routine",
-        "household": {"members": {"ana": "works_from_home", "ben": "retired", "cleo": "student"}},
-    }
-    content = {
-        "simulation": {"start": "2026-01-05", "duration": "1 d", "seed": 4, **BLOCK},
-        "floorplan": {"type": "bundled", "furnish": True},
-        "users": dict.fromkeys(("ana", "ben", "cleo"), member),
-        "robots": {"astro": {"type": "patrol", "dwell": "1 min"}},
-    }
-    stored = assert_same_for_every_max_span(content, 997)
-    content["simulation"].pop("people_block")
-    free = run(content)
-
-    assert 10 < len(gives_way(stored)) < 2000
-    for name in ("ana", "ben", "cleo"):
-        activities = [
-            rows[(rows["event"] == "activity") & (rows["entity"] == name)]["detail"].tolist()
-            for rows in (stored.pandas("events"), free.pandas("events"))
-        ]
-        same = len(set(activities[0]) & set(activities[1])) / len(set(activities[1]))
-        assert same > 0.8
-
-
 @pytest.mark.parametrize("step", ["250 ms", "2 s"])
 def test_steps_of_any_length_and_copies_give_the_same(step):
     users = {name: {"type": "meander", "speed": 0.7} for name in ("ana", "ben", "cleo")}

@@ -11,7 +11,7 @@ from tests.entities.robots.robots import (
     rooms,
 )
 from tests.entities.robots.test_find import belief
-from tests.scenes import digests, path, run
+from tests.scenes import path, run
 
 import fleet2d
 from fleet2d.errors import InputError
@@ -54,19 +54,6 @@ def test_it_comes_no_nearer_while_it_is_patient():
     stored = run(polite(stands(2.8, 3.5), patience="1 h"))
     assert gap(stored).min() >= KEPT - 0.01
     assert 1 == names(stored).count("gives_way")
-
-
-def test_steps_of_any_length_and_copies_give_the_same():
-    import copy
-
-    content = polite("meander", [{"type": "find", "every": "2 min", "deadline": "1 min"}, "patrol"])
-    content["robots"]["astro"]["camera"] = {"lost_after": "6 s"}  # a multiple of each step
-    for step in ("250 ms", "2 s"):
-        content["simulation"]["step"] = step
-        assert_same_for_every_max_span(content, 61, 1)
-    simulation = fleet2d.Simulation(content)
-    simulation.advance(123)
-    assert digests(copy.deepcopy(simulation).run()) == digests(simulation.run())
 
 
 def own_approaches(stored, user="ana"):

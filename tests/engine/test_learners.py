@@ -189,13 +189,17 @@ def test_metrics_get_every_period_once_and_at_the_end_its_rest(period, expected)
 
 
 def test_poses_and_observations_of_a_history_are_those_that_are_stored():
-    found = []
+    found = {"ana": [], "astro": [], "observations": []}
 
     def update(history, state):
-        observations = history.observations
-        assert observations.step.tolist() == sorted(observations.step.tolist())
-        assert all(history.first <= k < history.end for k in observations.step)
-        found.append((history.poses("ana"), history.poses("astro"), observations))
+        steps = history.observations.step
+        assert all(history.first <= k < history.end for k in steps)
+        found["observations"].append(history.observations)
+        for name in ("ana", "astro"):
+            found[name].append(history.poses(name))
+
+    def joined(name, column):
+        return np.concatenate([getattr(part, column) for part in found[name]])
 
     content = watched("20 min", metrics={"m": metric(update, period="7 min")})
     content["users"]["ana"] = {
@@ -205,26 +209,19 @@ def test_poses_and_observations_of_a_history_are_those_that_are_stored():
     }  # fmt: skip
     stored = fleet2d.run(content, "artifacts.trajectories=every step")
     rooms = {room.name: room.index for room in stored.plan.rooms}
-    for body, name in enumerate(("ana", "astro")):
+    for name in ("ana", "astro"):
         rows = table(stored, "trajectories", entity=name)
-        x, y, heading, away, room = (
-            np.concatenate([getattr(entry[body], column) for entry in found])
-            for column in ("x", "y", "heading", "away", "room")
-        )
         here = ~rows["away"]
-        assert rows["away"].tolist() == away.tolist()
-        assert rows["x"][here].tolist() == x[here].tolist()
-        assert rows["y"][here].tolist() == y[here].tolist()
-        assert rows["heading"] == pytest.approx(heading)
-        assert [rooms.get(r, -1) for r in rows["room"]] == room.tolist()
-    assert away.size == 1200
+        assert rows["away"].tolist() == joined(name, "away").tolist()
+        for column in ("x", "y"):
+            assert rows[column][here].tolist() == joined(name, column)[here].tolist()
+        assert rows["heading"] == pytest.approx(joined(name, "heading"))
+        assert [rooms.get(r, -1) for r in rows["room"]] == joined(name, "room").tolist()
     rows = table(stored, "observations")
     assert len(rows["step"]) > 30
     for column in ("step", "x", "y"):
-        seen = np.concatenate([getattr(entry[2], column) for entry in found])
-        assert rows[column].tolist() == seen.tolist()
-    seen = np.concatenate([entry[2].room for entry in found])
-    assert [rooms[r] for r in rows["room"]] == seen.tolist()
+        assert rows[column].tolist() == joined("observations", column).tolist()
+    assert [rooms[r] for r in rows["room"]] == joined("observations", "room").tolist()
 
 
 def test_draws_of_an_algorithm_depend_on_path_purpose_and_step():

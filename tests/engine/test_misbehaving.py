@@ -2,7 +2,6 @@
 
 import json
 import time
-from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from tests.scenes import fleet2d_process, process, scenario
 from tests.thorough import some
 
 import fleet2d
-from fleet2d import Algorithm, Behavior, Metric
+from fleet2d import Algorithm, Metric
 from fleet2d.cli.run import watched
 from fleet2d.configuration.importing import import_class
 from fleet2d.errors import ComponentError, Fleet2DError, ScenarioError, blame
@@ -349,18 +348,6 @@ def test_arrays_of_the_history_are_read_only():
     metrics = {"writes": {"type": name(Writes), "period": "1 h"}}
     fleet2d.run(small(metrics=metrics), seed=4)
     assert [] == sorted(set(Writes.writable))
-
-
-class Stays(Behavior):
-    """Stays for far too long."""
-
-    def decide(self, now):
-        return now.plan().stay(timedelta.max)
-
-
-def test_a_stay_of_millions_of_years_is_refused():
-    with pytest.raises(ComponentError, match=r"users\.ana.*1000 years"):
-        fleet2d.run(small(users={"ana": {"type": name(Stays)}}), seed=4)
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """Sensors: on and off at the right step, past no wall, in any span, in a table of their own."""
 
-import json
 from datetime import timedelta
 from typing import ClassVar
 
@@ -8,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.engine.test_change_queue import flat, home, stands
-from tests.scenes import digests, run, table
+from tests.engine.test_change_queue import home, stands, write_three_rooms
+from tests.scenes import box, digests, run, table
 
 import fleet2d
 from fleet2d import Algorithm, InputError
@@ -19,26 +18,11 @@ from fleet2d.interventions import Replan
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory):
-    content = flat()
-    content["objects"] += [
-        {
-            "name": "bed",
-            "type": "bed",
-            "footprint": [[9, 0], [11, 0], [11, 1.4], [9, 1.4]],
-            "uses": [
-                {"x": 10, "y": 0.7, "heading": 0, "posture": "lie", "approach": [10, 1.8]},
-            ],
-        },
-        {
-            "name": "stove",
-            "type": "stove",
-            "footprint": [[0, 2.4], [0.6, 2.4], [0.6, 3], [0, 3]],
-            "uses": [{"x": 0.3, "y": 2.1, "heading": 1.57, "posture": "stand"}],
-        },
-    ]
-    path = tmp_path_factory.mktemp("flat") / "flat.json"
-    path.write_text(json.dumps(content))
-    return str(path)
+    lies = {"x": 10, "y": 0.7, "heading": 0, "posture": "lie", "approach": [10, 1.8]}
+    bed = {"name": "bed", "type": "bed", "footprint": box(9, 0, 11, 1.4), "uses": [lies]}
+    cooks = {"x": 0.3, "y": 2.1, "heading": 1.57, "posture": "stand"}
+    stove = {"name": "stove", "type": "stove", "footprint": box(0, 2.4, 0.6, 3), "uses": [cooks]}
+    return write_three_rooms(tmp_path_factory.mktemp("rooms"), bed, stove)
 
 
 def visits(*items):

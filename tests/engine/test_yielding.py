@@ -1,12 +1,12 @@
 """Robots keep clear of people and of each other; the odd cases, and 300 random homes full of them."""
 
-import json
 from itertools import combinations
 
 import numpy as np
 import pytest
+import shapely
 from tests.entities.robots.robots import assert_same_for_every_max_span
-from tests.scenes import path, run
+from tests.scenes import box, path, run, write_plan
 from tests.scenes import scenario as of_ghosts
 from tests.thorough import some
 
@@ -58,18 +58,16 @@ def ends_at(stored, name):
     return round(float(way.x[-1]), 2), round(float(way.y[-1]), 2)
 
 
-def corridor(tmp_path, width=0.5):
+def corridor(folder, low=1.25, high=1.75):
     """Two rooms, and a corridor of five metres between them, through which one robot fits."""
-    low, high = 1.5 - width / 2, 1.5 + width / 2
-    outline = [[0, 0], [3, 0], [3, low], [8, low], [8, 0], [11, 0], [11, 3], [8, 3], [8, high], [3, high], [3, 3], [0, 3]]  # fmt: skip
-    rooms = [
-        {"type": "kitchen", "polygon": [[0, 0], [3, 0], [3, 3], [0, 3]]},
-        {"type": "corridor", "polygon": [[3, low], [8, low], [8, high], [3, high]]},
-        {"type": "bedroom", "polygon": [[8, 0], [11, 0], [11, 3], [8, 3]]},
-    ]
-    file = tmp_path / "corridor.json"
-    file.write_text(json.dumps({"format": "fleet2d-floorplan", "version": 1, "name": "corridor", "free": [{"outline": outline, "holes": []}], "rooms": rooms}))  # fmt: skip
-    return {"type": "native", "path": str(file)}
+    boxes = {
+        "kitchen": box(0, 0, 3, 3),
+        "corridor": box(3, low, 8, high),
+        "bedroom": box(8, 0, 11, 3),
+    }
+    space = shapely.union_all([shapely.Polygon(each) for each in boxes.values()])
+    outline = [list(corner) for corner in space.exterior.coords[:-1]]
+    return {"type": "native", "path": write_plan(folder, outline, boxes)}
 
 
 def test_two_robots_on_one_spot_part_and_never_meet_again():
@@ -78,16 +76,6 @@ def test_two_robots_on_one_spot_part_and_never_meet_again():
     stored = assert_same_for_every_max_span(content, 61, 1)
     assert nearest(stored, "butler", "guard", since=10) >= 0
     assert (2.0, 3.0) in (ends_at(stored, "butler"), ends_at(stored, "guard"))
-
-
-@pytest.mark.parametrize("people_block", [None, "3 s"])
-def test_two_robots_that_go_to_one_spot_stop_beside_each_other(people_block):
-    robots = {"butler": robot([1, 1], [3, 3], 600.0), "guard": robot([4, 1], [3, 3], 600.0)}
-    content = scenario("5 min", robots=robots, simulation={"people_block": people_block})
-    stored = assert_same_for_every_max_span(content, 61, 1)
-    assert 0 <= nearest(stored, "butler", "guard")
-    assert ends_at(stored, "butler") == (3.0, 3.0)
-    assert np.hypot(*(np.array(ends_at(stored, "guard")) - 3)) < 0.6
 
 
 def test_robots_that_are_drawn_begin_apart():

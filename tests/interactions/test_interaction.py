@@ -32,14 +32,6 @@ def test_requests_come_up_at_their_times_and_expire():
     assert {"due": next_due, "expired": next_due + 30 * MINUTE} == requests.next_changes()
 
 
-def test_a_request_expires_at_its_deadline():
-    requests = queue()
-    assert ["due"] == [change.event for change in requests.advance(MONDAY + 8 * HOUR)]
-    assert [] == requests.advance(MONDAY + 8 * HOUR + 29 * MINUTE)
-    assert ["expired"] == [c.event for c in requests.advance(MONDAY + 8 * HOUR + 30 * MINUTE)]
-    assert [] == requests.open
-
-
 def test_requests_at_an_interval_count_from_the_start():
     times = queue(at=[], every="90 min").interactions["pill"].times(MONDAY, MONDAY + 2 * HOUR)
     assert MONDAY + 3 * HOUR == next(times)
@@ -73,8 +65,6 @@ def test_the_most_valuable_request_comes_first():
     [
         (Outcome.ACCEPTED, 3, None),
         (Outcome.DECLINED, 3, None),
-        (Outcome.SENT_AWAY, 3, None),
-        (Outcome.BANNED, 3, None),
         (Outcome.SWITCHED_OFF, 3, None),
         (Outcome.DEFERRED, 3, 17 * MINUTE),
         (Outcome.IGNORED, 3, 10 * MINUTE),

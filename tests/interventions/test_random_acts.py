@@ -4,6 +4,7 @@ import random
 from datetime import timedelta
 
 import pytest
+import yaml
 from tests.scenes import digests
 from tests.thorough import some
 
@@ -119,166 +120,157 @@ HOME = {
     },
     "algorithms": {"ltp": {"type": "long_term_presence", "estimator": "likelihood"}},
 }
-KINDS = ("kitchen", "bedroom", "bathroom", "office", "living_room", "hallway", "laundry", "storage")
+
+
+# Every way to write each intervention; a word of `Chance` is drawn.
+ACTS = """
+put: body, to: place
+send: body, to: place, duration: lasting
+hold: body, duration: lasting
+release: body
+replan: body
+configure: body, behavior: patrol, keys: {dwell: 5 min}
+configure: body, behavior: hangout, keys: {no_stops_in: [kind]}
+configure: body, behavior: schedule, keys: {days: days}
+configure: body, behavior: routine, keys: {persona: retired}
+drive: body
+decide: body, plan: plan
+away: user, duration: lasting
+call_home: user, to: place, duration: lasting
+guest: gina, to: place, duration: 5 min
+activity: user, what: doing, duration: lasting
+activity: user, what: doing, to: place, duration: lasting
+call: astro, to: place
+call: astro, find: user
+call: astro, dock: true
+dismiss: robot
+keep_out: robot, of: kind, duration: lasting
+keep_out: robot, of: room, duration: lasting
+keep_out: robot, of: [kitchen, bedroom, bathroom], duration: lasting
+battery: astro, charge: 0
+battery: astro, charge: share
+power: robot, duration: lasting
+power: robot, state: "on"
+power: robot, state: crash
+power: robot, state: update, duration: lasting
+switch_off: body, camera: true, duration: lasting
+switch_off: body, behavior: behavior, duration: lasting
+switch_on: body, camera: true
+switch_on: body, behavior: behavior
+fault: robot, wheels: true, duration: lasting
+fault: robot, lost: true, duration: lasting
+fault: robot, charger: true, duration: lasting
+fault: robot, dark: true, duration: lasting
+fault: robot, detection: 0.3, duration: lasting
+kidnap: robot, to: place, duration: lasting
+relocalize: robot
+perceive: live, detections: [{user: user, x: x, y: y}]
+suppress: robot, user: user, duration: lasting
+mistake: robot, user: ana, taken_for: ben, duration: lasting
+inject: robot, user: ana, spot: point, duration: lasting
+reset: ltp
+replace: ltp, rooms: weights, duration: lasting
+replace: ltp, frozen: true, duration: lasting
+replace: ltp, withheld: true, duration: lasting
+restore: restored
+change: {shut: door}
+change: {open: door, at: 30 min}
+open: door
+shut: door
+lock: door
+unlock: door
+move: furniture, to: point, turn_deg: angle
+room: room, type: kind
+steer: robot, forward: speed
+lights: kind, turn: switch
+lights: all, turn: switch
+slow: corners, speed: 0.2, stop: 3 s, duration: lasting
+report: real, says: switch
+stick: contact, says: silent, duration: lasting
+stick: contact, says: switch, duration: lasting
+"""
+WORDS = {
+    "user": ["ana", "ben", "gina"],
+    "robot": ["astro", "bolt", "live"],
+    "kind": ["kitchen", "bedroom", "bathroom", "office", "living_room", "hallway", "storage"],
+    "lasting": [None, "1 s", "3 min", "20 min"],
+    "doing": ["wash", "breakfast", "read", "dinner", "sleep"],
+    "behavior": ["patrol", "routine", "dock"],
+    "restored": ["astro", "bolt", "contact", "ltp"],
+    "days": [[{"on": "daily", "items": ITEMS[:1]}]],
+    "angle": [0, 45, 90],
+    "speed": [-0.2, 0.1, 0.5],
+    "switch": ["on", "off"],
+}
 
 
 class Chance:
     """Draws interventions of all kinds, most of which are possible in the home."""
 
     def __init__(self, seed, simulation):
-        self.random, self.simulation = random.Random(seed), simulation
-        home = simulation.home
-        self.rooms = [room.name for room in home.rooms]
-        self.furniture = [item.name for item in home.objects]
-
-    def one(self, *values):
-        return self.random.choice(values)
+        self.random = random.Random(seed)
+        self.simulation = simulation
+        self.rooms = simulation.home.rooms
+        self.words = WORDS | {
+            "body": [*WORDS["user"], *WORDS["robot"]],
+            "room": [room.name for room in self.rooms],
+            "furniture": [item.name for item in simulation.home.objects],
+        }
+        self.words["place"] = [*self.words["room"], *WORDS["kind"], "sofa", "bed"]
 
     def point(self):
-        room = self.random.choice(self.simulation.home.rooms)
-        x, y = room.anchor_xy
+        x, y = self.random.choice(self.rooms).anchor_xy
         return [x + self.random.uniform(-2, 2), y + self.random.uniform(-2, 2)]
-
-    def place(self):
-        return self.one(self.point(), self.one(*self.rooms), self.one(*KINDS), "sofa", "bed")
-
-    def robot(self):
-        return str(self.one("astro", "bolt", "live"))
-
-    def user(self):
-        return str(self.one("ana", "ben", "gina"))
-
-    def body(self):
-        return str(self.one(self.user(), self.robot()))
-
-    def lasting(self):
-        return self.one({}, {"duration": "1 s"}, {"duration": "3 min"}, {"duration": "20 min"})
 
     def corners(self):
         x, y = self.point()
         return [[x, y], [x + 2, y], [x + 2, y + 1], [x, y + 1]]
 
-    def plan(self, name):
-        plan = self.simulation.plan(name).turn_by(0.5).stay(timedelta(seconds=40))
-        return dict(data_of(plan))
-
-    def keys(self):
-        return self.one(
-            {"behavior": "patrol", "keys": {"dwell": self.one("1 s", "5 min")}},
-            {"behavior": "hangout", "keys": {"no_stops_in": [self.one(*KINDS)]}},
-            {"behavior": "schedule", "keys": {"days": [{"on": "daily", "items": ITEMS[:1]}]}},
-            {"behavior": "routine", "keys": {"persona": "retired"}},
-        )
+    def drawn(self, value, subject):
+        """Draw what stands for a word, also within lists and mappings."""
+        if isinstance(value, list):
+            return [self.drawn(each, subject) for each in value]
+        if isinstance(value, dict):
+            return {key: self.drawn(each, subject) for key, each in value.items()}
+        match value:
+            case "point":
+                return self.point()
+            case "x" | "y":
+                return self.point()["xy".index(value)]
+            case "place" if self.random.random() < 0.4:
+                return self.point()
+            case "corners":
+                return self.corners()
+            case "share":
+                return self.random.random()
+            case "weights":
+                return {self.drawn("room", subject): 1}
+            case "plan":
+                plan = self.simulation.plan(subject).turn_by(0.5)
+                return dict(data_of(plan.stay(timedelta(seconds=40))))
+        return self.random.choice(self.words.get(value, [value]))
 
     def fields(self, verb):
         """The fields of an intervention, with its subject under its verb."""
-        draw = {
-            "put": lambda: {"put": self.body(), "to": self.place()},
-            "send": lambda: {"send": self.body(), "to": self.place(), **self.lasting()},
-            "hold": lambda: {"hold": self.body(), **self.lasting()},
-            "release": lambda: {"release": self.body()},
-            "replan": lambda: {"replan": self.body()},
-            "configure": lambda: {"configure": self.body(), **self.keys()},
-            "drive": lambda: {"drive": self.body()},
-            "decide": lambda: {"decide": (name := self.body()), "plan": self.plan(name)},
-            "away": lambda: {"away": self.user(), **self.lasting()},
-            "call_home": lambda: {"call_home": self.user(), "to": self.place(), **self.lasting()},
-            "guest": lambda: {"guest": "gina", "to": self.place(), "duration": "5 min"},
-            "activity": lambda: {
-                "activity": self.user(),
-                "what": self.one("wash", "breakfast", "read", "dinner", "sleep"),
-                **self.one({}, {"to": self.place()}),
-                **self.lasting(),
-            },
-            "call": lambda: {
-                "call": "astro",
-                **self.one({"to": self.place()}, {"find": self.user()}, {"dock": True}),
-            },
-            "dismiss": lambda: {"dismiss": self.robot()},
-            "keep_out": lambda: {
-                "keep_out": self.robot(),
-                "of": self.one(self.one(*KINDS), self.one(*self.rooms), [*KINDS[:3]]),
-                **self.lasting(),
-            },
-            "battery": lambda: {"battery": "astro", "charge": self.one(0, self.random.random())},
-            "power": lambda: {
-                "power": self.robot(),
-                **self.one({"state": "on"}, {"state": "crash"}, {"state": "update", **self.lasting()}, self.lasting()),
-            },
-            "switch_off": lambda: {
-                "switch_off": self.body(),
-                **self.one({"camera": True}, {"behavior": self.one("patrol", "routine", "dock")}),
-                **self.lasting(),
-            },
-            "switch_on": lambda: {
-                "switch_on": self.body(),
-                **self.one({"camera": True}, {"behavior": self.one("patrol", "routine", "dock")}),
-            },
-            "fault": lambda: {
-                "fault": self.robot(),
-                **self.one(
-                    {"wheels": True}, {"lost": True}, {"charger": True}, {"dark": True},
-                    {"detection": 0.3},
-                ),
-                **self.lasting(),
-            },
-            "kidnap": lambda: {"kidnap": self.robot(), "to": self.place(), **self.lasting()},
-            "relocalize": lambda: {"relocalize": self.robot()},
-            "perceive": lambda: {
-                "perceive": "live",
-                "detections": [{"user": self.user(), "x": self.point()[0], "y": self.point()[1]}],
-            },
-            "suppress": lambda: {
-                "suppress": self.robot(), "user": self.user(), **self.lasting()
-            },
-            "mistake": lambda: {
-                "mistake": self.robot(), "user": "ana", "taken_for": "ben", **self.lasting()
-            },
-            "inject": lambda: {
-                "inject": self.robot(), "user": "ana", "spot": self.point(), **self.lasting()
-            },
-            "reset": lambda: {"reset": "ltp"},
-            "replace": lambda: {
-                "replace": "ltp",
-                **self.one({"rooms": {self.one(*self.rooms): 1}}, {"frozen": True}, {"withheld": True}),
-                **self.lasting(),
-            },
-            "restore": lambda: {"restore": self.one("astro", "bolt", "contact", "ltp")},
-            "change": lambda: {"change": self.one({"shut": "door"}, {"open": "door", "at": "30 min"})},
-            "open": lambda: {"open": "door"},
-            "shut": lambda: {"shut": "door"},
-            "lock": lambda: {"lock": "door"},
-            "unlock": lambda: {"unlock": "door"},
-            "move": lambda: {
-                "move": self.one(*self.furniture, "sofa_1"),
-                "to": self.point(),
-                "turn_deg": self.one(0, 45, 90),
-            },
-            "room": lambda: {"room": self.one(*self.rooms), "type": self.one(*KINDS)},
-            "steer": lambda: {"steer": self.robot(), "forward": self.one(-0.2, 0.1, 0.5)},
-            "lights": lambda: {
-                "lights": self.one(*KINDS, "all"), "turn": self.one("on", "off")
-            },
-            "slow": lambda: {
-                "slow": self.corners(), "speed": 0.2, "stop": "3 s", **self.lasting()
-            },
-            "report": lambda: {"report": "real", "says": self.one("on", "off")},
-            "stick": lambda: {
-                "stick": "contact", "says": self.one("on", "off", "silent"), **self.lasting()
-            },
-        }  # fmt: skip
-        return dict(draw[verb]())
+        ways = [line for line in ACTS.splitlines() if line.startswith(f"{verb}: ")]
+        subject = None
+        fields = {}
+        for key, value in yaml.safe_load(f"{{{self.random.choice(ways)}}}").items():
+            fields[key] = self.drawn(value, subject)
+            subject = subject or fields[key]
+        return {key: value for key, value in fields.items() if value is not None}
 
     def when(self):
         """When it happens: now; at a time; or at events, which others may have made impossible."""
         minute = self.simulation.step // 60 + self.random.randrange(1, 30)
-        return self.one(
+        times = [
             {},
             {"at": f"{minute} min"},
-            {"on": ["activity", self.user()]},
+            {"on": ["activity", self.drawn("user", None)]},
             {"on": "room_changed"},
             {"on": ["shut", "door"], "delay": "10 s"},
-        )
+        ]
+        return self.random.choice(times)
 
 
 @pytest.mark.slow

@@ -233,17 +233,15 @@ def test_walk_by_unknown_rules_is_refused_not_guessed():
         run.path("ana")
 
 
-@pytest.mark.parametrize("objects", [{}, {"door": {"type": "door", "doorway": "bathroom_1"}}])
-@pytest.mark.parametrize("at", [(1,), (300,), (3600,), (300, 300, 4000)])
-def test_a_person_who_walks_at_random_can_be_put_elsewhere(objects, at):
+@pytest.mark.parametrize("at", [(1,), (3600,), (300, 300, 4000)])
+def test_a_person_who_walks_at_random_can_be_put_elsewhere(at):
     """Before, the stored run couldn't be rebuilt, and so had no picture."""
     simulation = Simulation(
         {
             "simulation": {"start": "2026-01-05T08:00", "duration": "90 min", "seed": 1},
             "floorplan": "bundled",
             "users": {"ana": "meander", "ben": "meander"},
-            "robots": {},
-            "objects": objects,
+            "objects": {"door": {"type": "door", "doorway": "bathroom_1"}},
             "artifacts": {"trajectories": "every step"},
         }
     )
@@ -251,11 +249,7 @@ def test_a_person_who_walks_at_random_can_be_put_elsewhere(objects, at):
         simulation.run_until(timedelta(seconds=step))
         simulation.do(Put("ana", room))
     run = simulation.run()
-    rows = run.pandas("trajectories")
-    for name in ("ana", "ben"):
-        path, stored = run.path(name, every=timedelta(seconds=1)), rows[rows["entity"] == name]
-        assert np.array_equal(path.x, stored["x"].to_numpy())
-        assert np.array_equal(path.y, stored["y"].to_numpy())
+    assert_rebuilt(run)
     room = run.plan.rooms[int(run.path("ana", every=timedelta(seconds=1)).room[at[0]])]
     assert "kitchen" == room.type or len(at) > 1
 

@@ -5,9 +5,7 @@ from datetime import datetime, timedelta
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.scenes import run, scenario, table
 
-import fleet2d
 from fleet2d.runtime.clock import Clock
 
 START = datetime(2026, 3, 28, 23, 59, 59, 500_000)
@@ -42,18 +40,3 @@ def test_a_thousand_years_are_exact():
     last = clock.time(clock.steps)
     assert 365_250 == (last - clock.start).days
     assert last == clock.times(np.array([clock.steps])).tolist()[0]
-
-
-def test_tables_tell_the_local_time_of_their_step():
-    content = scenario("2 h", users={"ana": "meander"}, simulation={"start": "2026-12-31T23:00"})
-    rows = table(run(content, "artifacts.trajectories=30 min"), "trajectories")
-    assert [0, 1800, 3600, 5400] == rows["step"].tolist()
-    times = [str(t)[:16] for t in rows["time"]]
-    assert ["2026-12-31T23:00", "2026-12-31T23:30", "2027-01-01T00:00", "2027-01-01T00:30"] == times
-
-
-def test_the_simulation_tells_the_time_of_its_next_step():
-    simulation = fleet2d.Simulation(scenario("1 h"))
-    assert datetime(2026, 1, 5, 7) == simulation.time
-    simulation.advance(90)
-    assert datetime(2026, 1, 5, 7, 1, 30) == simulation.time

@@ -48,23 +48,6 @@ def test_bundled_scenario_loads(file):
     assert scenario.model_copy(update=without) == again.model_copy(update=without)
 
 
-def test_paper_scenario_has_its_numbers():
-    scenario = load_scenario("bundled:paper")
-
-    assert 30 * 86_400 == scenario.simulation.steps
-    assert (1, 1) == (len(scenario.users), len(scenario.robots))
-
-
-@pytest.mark.parametrize("order", [1, -1])
-def test_any_plan_goes_under_the_paper_scenario(shared_data, order):
-    plan = sorted((shared_data / "houseexpo").glob("*.json"))[0]
-    overrides = ["floorplan.type=houseexpo", f"floorplan.path={plan}"][::order]
-    scenario = load_scenario("bundled:paper", *overrides, "simulation.duration.days=7")
-
-    assert "houseexpo" == scenario.floorplan.type_name
-    assert 7 == scenario.simulation.duration.days
-
-
 def test_resolved_scenario_conforms_to_the_schema(validator):
     resolved = load_scenario("bundled:paper").resolved()
 

@@ -57,16 +57,9 @@ def said(source, *overrides, **settings):
     return str(caught.value)
 
 
-def test_simulation_defaults():
-    settings = simulation()
-
-    assert datetime(2026, 1, 5) == settings.start
-    assert (3600, 1_000_000) == (settings.steps, settings.step_us)
-    assert (None, None, None) == (settings.seed, settings.max_span, settings.speedup)
-
-
 def test_run_stops_at_the_last_full_step():
     assert 3 == simulation(duration="10 s", step="3 s").steps
+    assert 3600 == simulation().steps
 
 
 @pytest.mark.parametrize("start", [date(2026, 1, 5), "2026-01-05", "2026-01-05T00:00"])
@@ -186,13 +179,6 @@ def test_empty_scenario_names_what_is_missing():
         "simulation: missing, and has no default",
         "floorplan: missing, and has no default",
     ]
-
-
-def test_scenario_is_frozen(home):
-    scenario = load_scenario(home)
-
-    with pytest.raises(ValueError, match="frozen"):
-        scenario.name = "x"
 
 
 def test_where_says_where_a_key_was_written(tmp_path, monkeypatch):
