@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import shapely
-import yaml
 from numpy.typing import NDArray
 
 import fleet2d
+from fleet2d.configuration.documents import parse
 from fleet2d.engine.access import directory_of
 from fleet2d.runs.run import Run
 
@@ -192,16 +192,19 @@ def run(content: Mapping[str, Any], *overrides: str, **settings: Any) -> Run:
 
 
 def entries(text: str) -> list[Any]:
-    """Return entries of a script, one a line, as YAML has them between braces."""
-    return [yaml.safe_load(f"{{{line}}}") for line in text.strip().splitlines()]
+    """Return entries of a script, one a line, as a scenario's file has them between braces."""
+    return [parse(f"{{{line}}}") for line in text.strip().splitlines()]
 
 
-def unmet(content: Mapping[str, Any], expected: str, **settings: Any) -> list[str]:
-    """Run a scenario; return what those expectations say, one a line, that don't hold."""
-    lines = expected.strip().splitlines()
-    expect = {f"line_{number}": line.strip() for number, line in enumerate(lines, 1)}
-    verdicts = run({**content, "expect": expect}, **settings).manifest["expectations"]
-    return [verdict["says"] for verdict in verdicts.values() if verdict["holds"] is not True]
+def expecting(text: str) -> dict[str, str]:
+    """Return expectations, one a line, as a scenario has them."""
+    return {f"line_{n}": line.strip() for n, line in enumerate(text.strip().splitlines(), 1)}
+
+
+def unmet(stored: Run) -> list[str]:
+    """Return what those expectations of a run say that don't hold, or were never put to the test."""
+    verdicts = stored.manifest["expectations"].values()
+    return [verdict["says"] for verdict in verdicts if verdict["holds"] is not True]
 
 
 def digests(stored: Run) -> dict[str, Any]:

@@ -5,15 +5,13 @@ from datetime import timedelta
 import numpy as np
 import pytest
 import shapely
-from tests.scenes import box, digests, run, scenario, table, write_plan
+from tests.scenes import box, digests, entries, expecting, run, scenario, table, unmet, write_plan
 from tests.thorough import some
 
 import fleet2d
 from fleet2d import Algorithm, ComponentError, InputError
-from fleet2d.engine.change_queue import crossings
 from fleet2d.floorplan.home import HomeChange, HomeChanges
 from fleet2d.interventions import MoveFurniture
-from fleet2d.kernels import Breakpoints
 
 OUTLINE = [
     [0, 0], [4, 0], [4, 1], [4.1, 1], [4.1, 0], [8, 0], [8, 2], [8.1, 2], [8.1, 0], [11, 0],
@@ -131,36 +129,46 @@ def test_person_opens_the_door_in_time_and_it_falls_shut_behind(plan):
     assert through + 3 <= shut <= through + 5
 
 
-def test_robot_waits_at_a_shut_door_and_goes_on_when_it_opens(plan):
-    patrol = {"type": "patrol", "rooms": ["bathroom_1"], "dwell": "1 s"}
-    robots = {"astro": stands(6, 2.4, **patrol)}
-    content = home(plan, "10 min", robots=robots, objects=door("bathroom_1", open=False))
-    stored = run({**content, "script": [{"at": "5 min", "open": "door"}]})
-    where = table(stored, "trajectories", entity="astro")
-    assert 300 < where["step"][where["x"] > 8.1][0] < 330
+VISITS = {"type": "patrol", "rooms": ["bathroom_1"], "dwell": "1 s"}
+LEAVES = {"type": "patrol", "rooms": ["hallway_1", "kitchen_1"]}
+CASES = {
+    "a robot waits at a shut door and goes on when it opens": (
+        {"robots": {"astro": stands(6, 2.4, **VISITS)}, "objects": door("bathroom_1", open=False)},
+        "at: 5 min, open: door",
+        """
+        never(during(00:00-00:05) and room(astro) == bathroom)
+        eventually(room(astro) == bathroom, within=330 s)
+        """,
+    ),
+    "a robot on its way turns back at a door that shuts before it": (
+        {"robots": {"astro": stands(2, 1.45, **LEAVES)}},
+        "at: 1 s, shut: door",
+        "never(distance(astro, hallway) < 0.15)",
+    ),
+    "a door waits while somebody stands in it": (
+        {"users": {"ana": stands(4.05, 1.45)}, "objects": door(open=False)},
+        "",
+        "always(door(door))",
+    ),
+    "nobody walks through a locked door": (
+        {
+            "users": {"ana": goes(("00:00", "hallway")) | stands(2, 1.45)},
+            "objects": door(open=False, locked=True),
+        },
+        "at: 2 min, unlock: door",
+        """
+        never(during(00:00-00:02) and room(ana) == hallway)
+        eventually(room(ana) == hallway)
+        """,
+    ),
+}
 
 
-def test_robot_on_its_way_turns_back_at_a_door_that_shuts_before_it(plan):
-    robots = {"astro": stands(2, 1.45, type="patrol", rooms=["hallway_1", "kitchen_1"])}
-    content = home(plan, "2 min", robots=robots, objects=door())
-    stored = run({**content, "script": [{"at": "1 s", "shut": "door"}]})
-    assert table(stored, "trajectories", entity="astro")["x"].max() < 4.05 - 0.15
-
-
-def test_door_waits_while_somebody_stands_in_it(plan):
-    users = {"ana": stands(4.05, 1.45)}
-    simulation = fleet2d.Simulation(home(plan, "1 min", users=users, objects=door(open=False)))
-    simulation.run_until(timedelta(seconds=30))
-    assert frozenset() == simulation.home.shut
-
-
-def test_nobody_walks_through_a_locked_door(plan):
-    users = {"ana": goes(("00:00", "hallway")) | stands(2, 1.45)}
-    content = home(plan, "5 min", users=users, objects=door(open=False, locked=True))
-    stored = run({**content, "script": [{"at": "2 min", "unlock": "door"}]})
-    where = table(stored, "trajectories", entity="ana")
-    assert where["x"][:120].max() < 4.05
-    assert where["x"].max() > 4.1
+@pytest.mark.parametrize("name", CASES)
+def test_what_doors_do_to_bodies(plan, name):
+    sections, script, expected = CASES[name]
+    content = home(plan, "10 min", objects=door(), script=entries(script)) | sections
+    assert [] == unmet(run({**content, "expect": expecting(expected)}))
 
 
 def test_paths_go_round_a_moved_cart(plan):
@@ -240,16 +248,3 @@ def test_change_or_door_that_can_not_be_is_refused(plan, sections, message):
     content = home(plan, users={"ana": stands(6, 1.45)}, objects=door()) | sections
     with pytest.raises(InputError, match=message):
         fleet2d.Simulation(content)
-
-
-def test_track_crosses_a_line_at_the_moment_it_does():
-    track = Breakpoints(
-        np.array([0, 1000, 2000, 3000]),
-        np.array([0, 100, 100, 0]),
-        np.array([0, 0, 50, 50]),
-        np.zeros(4, np.int64),
-        np.zeros(4, np.uint8),
-    )
-    assert [250, 2750] == crossings(track, ((25, -100), (25, 100)))
-    assert [250] == crossings(track, ((25, -100), (25, 10)))
-    assert [] == crossings(track, ((25, 10), (25, 40)))

@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span
-from tests.scenes import digests, everything, path, run, scenario
+from tests.scenes import digests, everything, expecting, path, run, scenario, unmet
 from tests.thorough import some
 
 import fleet2d
@@ -35,16 +35,45 @@ def gives_way(stored):
     return list(zip(rows["step"], rows["entity"], rows["detail"], strict=True))
 
 
-def test_somebody_waits_before_a_body_and_then_goes_round_it():
-    users = {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [2.5, 3]}}
-    stored = assert_same_for_every_max_span(home(users=users), 61, 7, 1)
-    ana = path(stored, "ana")
+CASES = {
+    "one waits before somebody and then goes round": (
+        {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [2.5, 3]}},
+        """
+        at_most(1, events(gives_way), per=day)
+        eventually(events(gives_way, ana, detail=ben))
+        always(distance(ana, ben) >= 0.4)
+        at_end(distance(ana, [4, 3]) < 2 mm)
+        eventually(holds_for(not moving(ana) and distance(ana, [1, 3]) > 0.3, 2 s), within=8 s)
+        never(holds_for(not moving(ana) and distance(ana, [4, 3]) > 1.5, 4 s))
+        """,
+    ),
+    # Ben stands in the doorway, too wide to be passed.
+    "where there is no way round one squeezes past": (
+        {
+            "ana": walker([3.05, 3.1], [7.05, 3.1], 60.0),
+            "ben": {"start": [5.05, 3.1], "radius": 0.3},
+        },
+        """
+        eventually(distance(ana, ben) < 0.1)
+        never(holds_for(distance(ana, ben) < 0.5, 2 s))
+        at_end(distance(ana, [7.05, 3.1]) < 2 mm)
+        """,
+    ),
+    "where somebody stands already one stops beside": (
+        {"ana": walker([1, 3], [3, 3], 60.0), "ben": {"start": [3, 3]}},
+        """
+        always(distance(ana, ben) >= 0.4)
+        at_end(distance(ana, ben) <= 0.6)
+        """,
+    ),
+}
 
-    assert [("ana", "ben")] == [row[1:] for row in gives_way(stored)]
-    assert gap(stored).min() >= 0.4
-    assert (4, 3) == pytest.approx((ana.x[-1], ana.y[-1]), abs=1e-3)
-    stands = np.flatnonzero(np.diff(ana.x) == 0)
-    assert 3 == len(stands[ana.x[stands] < 2.5])
+
+@pytest.mark.parametrize("name", CASES)
+def test_how_people_get_past_each_other(name):
+    users, expected = CASES[name]
+    content = home(users=users, expect=expecting(expected))
+    assert [] == unmet(assert_same_for_every_max_span(content, 61, 7, 1))
 
 
 def test_somebody_who_is_gone_in_time_is_only_waited_for():
@@ -75,25 +104,6 @@ def test_of_two_who_meet_the_first_one_goes_round(starts):
     assert gap(stored).min() >= 0.35
     assert np.abs(ana.y - 3).max() > 0.3 > np.abs(ben.y - 3).max()
     assert (4.5, 0.5) == pytest.approx((ana.x[-1], ben.x[-1]), abs=1e-3)
-
-
-def test_where_there_is_no_way_round_one_squeezes_past():
-    """Ben stands in the doorway, too wide to be passed."""
-    users = {"ana": walker([3.05, 3.1], [7.05, 3.1], 60.0)}
-    users["ben"] = {"start": [5.05, 3.1], "radius": 0.3}
-    stored = assert_same_for_every_max_span(home(users=users), 61, 1)
-
-    assert gap(stored).min() < 0.1
-    assert (gap(stored) < 0.5).sum() <= 2, "overlapping for no longer than it takes to walk past"
-    assert path(stored, "ana").x[-1] == pytest.approx(7.05, abs=1e-3)
-
-
-def test_where_somebody_stands_already_one_stops_beside():
-    users = {"ana": walker([1, 3], [3, 3], 60.0), "ben": {"start": [3, 3]}}
-    stored = assert_same_for_every_max_span(home(users=users), 7, 1)
-
-    assert 0.4 <= gap(stored)[-1] <= 0.6
-    assert gap(stored).min() >= 0.4
 
 
 def test_what_was_to_come_later_comes_in_time_after_a_rest():

@@ -4,7 +4,7 @@ import copy
 import io
 
 import pytest
-from tests.scenes import AGENDA, digests, scenario, table
+from tests.scenes import AGENDA, digests, entries, scenario, table
 
 import fleet2d
 from fleet2d.errors import ScenarioError
@@ -30,16 +30,18 @@ def home(script, duration="1 h", **more):
     )
 
 
-LIVELY = [
-    {"at": "07:05", "put": "ben", "to": "bedroom"},
-    {"at": "07:05", "send": "ben", "to": "living_room", "duration": "3 min"},
-    {"at": "10 min", "call": "astro", "find": "ana"},
-    {"on": ["found", "astro"], "delay": "3 s", "call": "astro", "to": "kitchen"},
-    {"on": ["user_seen", "astro"], "each": True, "delay": "1 s", "shut": "bath_door"},
-    {"on": ["sensor", "contact", "CLOSE"], "each": True, "delay": "20 s", "open": "bath_door"},
-    {"on": ["activity", "ana"], "hold": "ben", "duration": "40 s"},
-    {"at": "daily 07:40", "each": True, "away": "ben", "duration": "5 min"},
-]
+LIVELY = entries(
+    """
+    at: 5 min, put: ben, to: bedroom
+    at: 5 min, send: ben, to: living_room, duration: 3 min
+    at: 10 min, call: astro, find: ana
+    on: [found, astro], delay: 3 s, call: astro, to: kitchen
+    on: [user_seen, astro], each: true, delay: 1 s, shut: bath_door
+    on: [sensor, contact, CLOSE], each: true, delay: 20 s, open: bath_door
+    on: [activity, ana], hold: ben, duration: 40 s
+    at: daily 07:40, each: true, away: ben, duration: 5 min
+    """
+)
 
 
 def acts(run):
@@ -114,31 +116,31 @@ def test_a_scenario_without_a_script_waits_for_nothing():
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
-        ({"at": "19:00", "hold": "ana"}, "at: 19:00 is not within the run"),
-        ({"at": "1 h", "hold": "ana"}, "not within the run"),
-        ({"at": "2026-01-05T06:59:59", "hold": "ana"}, "not within the run"),
-        ({"at": "tuesday 07:30", "hold": "ana"}, "not within the run"),
-        ({"at": "5 s", "hold": "anna"}, "'anna': did you mean 'ana'"),
-        ({"at": "5 s", "away": "astro"}, "no user 'astro'"),
-        ({"at": "5 s", "call": "ana", "dock": True}, "no robot 'ana'"),
-        ({"at": "5 s", "put": "ana", "to": "kitchn"}, "did you mean 'kitchen'"),
-        ({"at": "5 s", "send": "ana", "to": "storage"}, "can't be reached"),
-        ({"at": "5 s", "send": "ana", "to": [50, 50]}, "is in a wall"),
-        ({"at": "5 s", "activity": "ana", "what": "breakfst"}, "did you mean 'breakfast'"),
-        ({"at": "5 s", "call": "astro", "dock": True}, "none of the behaviors of astro answers"),
-        ({"at": "5 s", "shut": "bat_door"}, "did you mean 'bath_door'"),
-        ({"at": "5 s", "room": "kitchen_1", "type": "bedrom"}, "did you mean 'bedroom'"),
-        ({"on": "user_sen", "hold": "ana"}, "did you mean 'user_seen'"),
-        ({"on": ["user_seen", "asto"], "hold": "ana"}, "did you mean 'astro'"),
-        ({"on": ["user_seen", "astro", "bens"], "hold": "ana"}, "did you mean 'ben'"),
-        ({"on": ["docks", "astro"], "hold": "ana"}, "'docks' can never happen to astro"),
-        ({"on": "robot_seen", "hold": "ana"}, "'robot_seen' can never happen in this run"),
-        ({"on": ["shut", "contact"], "hold": "ana"}, "can never happen to contact"),
+        ("at: 19:00, hold: ana", "at: 19:00 is not within the run"),
+        ("at: 1 h, hold: ana", "not within the run"),
+        ("at: 2026-01-05T06:59:59, hold: ana", "not within the run"),
+        ("at: tuesday 07:30, hold: ana", "not within the run"),
+        ("at: 5 s, hold: anna", "'anna': did you mean 'ana'"),
+        ("at: 5 s, away: astro", "no user 'astro'"),
+        ("at: 5 s, call: ana, dock: true", "no robot 'ana'"),
+        ("at: 5 s, put: ana, to: kitchn", "did you mean 'kitchen'"),
+        ("at: 5 s, send: ana, to: storage", "can't be reached"),
+        ("at: 5 s, send: ana, to: [50, 50]", "is in a wall"),
+        ("at: 5 s, activity: ana, what: breakfst", "did you mean 'breakfast'"),
+        ("at: 5 s, call: astro, dock: true", "none of the behaviors of astro answers"),
+        ("at: 5 s, shut: bat_door", "did you mean 'bath_door'"),
+        ("at: 5 s, room: kitchen_1, type: bedrom", "did you mean 'bedroom'"),
+        ("on: user_sen, hold: ana", "did you mean 'user_seen'"),
+        ("on: [user_seen, asto], hold: ana", "did you mean 'astro'"),
+        ("on: [user_seen, astro, bens], hold: ana", "did you mean 'ben'"),
+        ("on: [docks, astro], hold: ana", "'docks' can never happen to astro"),
+        ("on: robot_seen, hold: ana", "'robot_seen' can never happen in this run"),
+        ("on: [shut, contact], hold: ana", "can never happen to contact"),
     ],
 )
 def test_what_can_not_be_is_refused_before_the_run(entry, words):
     with pytest.raises((ScenarioError, fleet2d.InputError), match=rf"script\.1: .*{words}"):
-        fleet2d.Simulation(home([{"at": "1 s", "hold": "ben"}, entry]))
+        fleet2d.Simulation(home(entries(f"at: 1 s, hold: ben\n{entry}")))
 
 
 def test_a_wrong_entry_is_named_by_its_line(tmp_path):

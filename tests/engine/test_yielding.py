@@ -1,12 +1,12 @@
 """Robots keep clear of people and of each other; the odd cases, and 300 random homes full of them."""
 
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import pytest
 import shapely
 from tests.entities.robots.robots import assert_same_for_every_max_span
-from tests.scenes import box, path, run, write_plan
+from tests.scenes import box, entries, expecting, path, run, unmet, write_plan
 from tests.scenes import scenario as of_ghosts
 from tests.thorough import some
 
@@ -33,18 +33,16 @@ def person(start, *script, **more):
     return {**WALK, "start": start, "script": list(script), "speed": 1.0, **more}
 
 
-def nearest(stored, one, other, since=0):
+def nearest(stored, one, other, until=None):
     """The smallest gap between two bodies at home, from the stored paths; below 0 they overlap [m]."""
     a, b = path(stored, one), path(stored, other)
-    here = (np.asarray(a.away) == 0) & (np.asarray(b.away) == 0)
-    here[:since] = False
-    gaps = np.hypot(a.x - b.x, a.y - b.y)[here] - radius(stored, one) - radius(stored, other)
-    return float(gaps.min(initial=np.inf))
+    gaps = np.hypot(a.x - b.x, a.y - b.y) - radius(stored, one) - radius(stored, other)
+    return float(gaps[:until][~(a.away | b.away)[:until]].min(initial=np.inf))
 
 
 def radius(stored, name):
     config = stored.manifest["scenario"]
-    return {**config["users"], **config["robots"]}[name]["radius"]  # type: ignore[no-any-return]
+    return {**config["users"], **config["robots"]}[name]["radius"]
 
 
 def told(stored, *kinds):
@@ -70,74 +68,78 @@ def corridor(folder, low=1.25, high=1.75):
     return {"type": "native", "path": write_plan(folder, outline, boxes)}
 
 
-def test_two_robots_on_one_spot_part_and_never_meet_again():
-    """The complaint: two on the same spot for an hour."""
-    content = scenario("1 h", robots={"butler": robot([2, 3]), "guard": robot([2, 3])})
-    stored = assert_same_for_every_max_span(content, 61, 1)
-    assert nearest(stored, "butler", "guard", since=10) >= 0
-    assert (2.0, 3.0) in (ends_at(stored, "butler"), ends_at(stored, "guard"))
+IN_CORRIDOR = {
+    "butler": robot([3.5, 1.5], [7.5, 1.5], 30.0, [1.0, 1.0], 900.0),
+    "guard": robot([7.5, 1.5], [3.5, 1.5], 30.0, [1.0, 2.0], 900.0),
+    "third": robot([8.5, 1.5], [5.0, 1.5], 30.0, [1.0, 1.5], 900.0),
+}
+CASES = {
+    # The complaint: two on the same spot for an hour.
+    "two on one spot part and never meet again": (
+        {"robots": {"butler": robot([2, 3]), "guard": robot([2, 3])}},
+        """
+        always(distance(butler, guard) >= 0.3, within=10 s..1 h)
+        at_end(distance(butler, [2, 3]) < 1 cm or distance(guard, [2, 3]) < 1 cm)
+        """,
+    ),
+    "one that is put into another moves out of it": (
+        {
+            "robots": {"butler": robot([1, 3]), "guard": robot([4, 1])},
+            "users": {"ana": person([4, 3])},
+            "script": entries("at: 1 min, put: guard, to: [1.1, 3.0]"),
+        },
+        """
+        eventually(distance(butler, guard) < 0.3)
+        always(distance(butler, guard) >= 0.3, within=70 s..1 h)
+        """,
+    ),
+    "two who meet in a corridor of one's width both get through": (
+        {
+            "robots": {
+                "butler": robot([1.0, 1.5], [10.0, 1.5], 900.0),
+                "guard": robot([10.5, 1.5], [1.0, 1.5], 900.0),
+            },
+            "floorplan": None,
+        },
+        """
+        always(distance(butler, guard) >= 0.3)
+        eventually(distance(butler, [10.0, 1.5]) < 1 cm, within=4 min)
+        eventually(distance(guard, [1.0, 1.5]) < 1 cm, within=4 min)
+        """,
+    ),
+    # The one without the right of way is hemmed in by a third: the other one has to back off.
+    "one that is caught in the corridor ends the deadlock with an event": (
+        {"robots": IN_CORRIDOR, "floorplan": None},
+        """
+        always(distance(butler, guard) >= 0.3)
+        always(distance(butler, third) >= 0.3)
+        always(distance(guard, third) >= 0.3)
+        eventually(events(deadlock))
+        never(during(07:14-07:15) and (speed(butler) > 0.01 or speed(guard) > 0.01))
+        """,
+    ),
+    "a person asleep before the door is waited for, and the stop is skipped": (
+        {
+            "robots": {"butler": robot([1.0, 1.5], [10.0, 1.5], 60.0, [1.0, 2.5], 9000.0)},
+            "users": {"ana": person([3.3, 1.5])},
+            "floorplan": None,
+        },
+        """
+        always(distance(butler, ana) >= 0.35)
+        eventually(events(gives_way, butler, detail=ana))
+        after(events(gives_way, butler), events(gives_up, butler, detail=ana), within=1 h)
+        """,
+    ),
+}
 
 
-def test_robots_that_are_drawn_begin_apart():
-    robots = {f"r{i}": {"start": "bathroom", "camera": None} for i in range(6)}
-    stored = run(scenario("10 s", robots=robots))
-    assert all(nearest(stored, *pair) >= 0 for pair in combinations(robots, 2))
-
-
-def test_two_who_meet_in_a_corridor_of_one_s_width_both_get_through(tmp_path):
-    robots = {"butler": robot([1.0, 1.5], [10.0, 1.5], 900.0), "guard": robot([10.5, 1.5], [1.0, 1.5], 900.0)}  # fmt: skip
-    content = {**scenario("4 min", robots=robots), "floorplan": corridor(tmp_path)}
-    stored = assert_same_for_every_max_span(content, 61, 7, 1)
-    assert nearest(stored, "butler", "guard") >= 0
-    assert ends_at(stored, "butler") == (10.0, 1.5)
-    assert ends_at(stored, "guard") == (1.0, 1.5)
-
-
-def test_a_robot_caught_in_the_corridor_ends_the_deadlock_with_an_event(tmp_path):
-    """The one without the right of way is hemmed in by a third: the other one has to back off."""
-    robots = {
-        "butler": robot([3.5, 1.5], [7.5, 1.5], 30.0, [1.0, 1.0], 900.0),
-        "guard": robot([7.5, 1.5], [3.5, 1.5], 30.0, [1.0, 2.0], 900.0),
-        "third": robot([8.5, 1.5], [5.0, 1.5], 30.0, [1.0, 1.5], 900.0),
-    }
-    content = {**scenario("15 min", robots=robots), "floorplan": corridor(tmp_path)}
-    stored = assert_same_for_every_max_span(content, 61, 1)
-    assert all(nearest(stored, *pair) >= 0 for pair in combinations(robots, 2))
-    assert told(stored, "deadlock")
-    for name in robots:
-        way = path(stored, name)
-        assert np.hypot(np.diff(way.x[-60:]), np.diff(way.y[-60:])).sum() < 0.5, "it has ended"
-
-
-def test_five_robots_queue_at_one_charger():
-    battery = {"driving": "40 min", "standing": "3 h", "charging": "10 min", "charger": [1.0, 3.0]}
-    dock = {"type": "dock", "threshold": "60 %", "until": "80 %"}
-    one = {"battery": {**battery, "charge": "50 %"}, "camera": None, "behaviors": [dock, {"type": "patrol", "dwell": "30 s"}]}  # fmt: skip
-    robots = {f"r{i}": {**one, "start": "living_room"} for i in range(5)}
-    stored = assert_same_for_every_max_span(scenario("3 h", robots=robots), 61)
-    assert all(nearest(stored, *pair) >= 0 for pair in combinations(robots, 2))
-    charged = {entity for _, _, entity, _ in told(stored, "charged")}
-    assert charged == set(robots)
-
-
-def test_a_person_asleep_before_the_door_is_waited_for_and_the_stop_is_skipped(tmp_path):  # fmt: skip
-    robots = {"butler": robot([1.0, 1.5], [10.0, 1.5], 60.0, [1.0, 2.5], 9000.0)}
-    content = {**scenario("20 min", robots=robots, users={"ana": person([3.3, 1.5])}), "floorplan": corridor(tmp_path)}  # fmt: skip
-    stored = assert_same_for_every_max_span(content, 61, 1)
-    assert nearest(stored, "butler", "ana") >= 0
-    assert [("gives_way", "butler", "ana"), ("gives_up", "butler", "ana")] == [row[1:] for row in told(stored, "gives_way", "gives_up")][:2]  # fmt: skip
-
-
-def test_a_robot_put_into_another_moves_out_of_it():
-    content = scenario(
-        "3 min",
-        robots={"butler": robot([1, 3]), "guard": robot([4, 1])},
-        users={"ana": person([4, 3])},
-        script=[{"at": "07:01", "put": "guard", "to": [1.1, 3.0]}],
-    )
-    stored = assert_same_for_every_max_span(content, 61, 1)
-    assert nearest(stored, "butler", "guard", since=70) >= 0
-    assert nearest(stored, "butler", "guard") < 0
+@pytest.mark.parametrize("name", CASES)
+def test_how_robots_yield(name, tmp_path):
+    sections, expected = CASES[name]
+    content = scenario("1 h", expect=expecting(expected)) | sections
+    if "floorplan" in sections:
+        content["floorplan"] = corridor(tmp_path)
+    assert [] == unmet(assert_same_for_every_max_span(content, 61, 1))
 
 
 def test_a_robot_leaves_in_time_for_a_person_whose_life_stays_the_same():
@@ -265,19 +267,10 @@ def test_in_random_homes_robots_overlap_with_nobody_who_does_not_walk_into_them(
     robots, users = content["robots"], content["users"]
     for pair in combinations(robots, 2):
         assert nearest(stored, *pair) >= 0, pair
+    # Until somebody walks into it, no robot overlaps with the person.
     forced = {(entity, detail): step for step, _, entity, detail in reversed(told(stored, "overlaps"))}  # fmt: skip
-    for name in robots:
-        for user in users:
-            since = 0
-            if (name, user) in forced:
-                # Until somebody walks into it, no robot overlaps with the person; and it gets out.
-                until = forced[name, user]
-                a, b = path(stored, name), path(stored, user)
-                gaps = np.hypot(a.x - b.x, a.y - b.y) - radius(stored, name) - radius(stored, user)
-                home = np.asarray(b.away) == 0
-                assert (gaps[:until][home[:until]] >= 0).all(), (name, user)
-                continue
-            assert nearest(stored, name, user, since) >= 0, (name, user)
+    for pair in product(robots, users):
+        assert nearest(stored, *pair, forced.get(pair)) >= 0, pair
     assert run(content, max_span=7).digest == stored.digest
 
 

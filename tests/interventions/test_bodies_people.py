@@ -1,7 +1,7 @@
 """What is done to people and robots by hand: where they are then, and what they do."""
 
 import pytest
-from tests.scenes import AGENDA, digests, entries, scenario, unmet
+from tests.scenes import AGENDA, digests, entries, expecting, scenario, unmet
 
 import fleet2d
 from fleet2d.errors import ScenarioError
@@ -139,7 +139,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_what_a_script_does_to_bodies(name):
     script, expected = CASES[name]
-    assert [] == unmet(home(*entries(script)), expected)
+    assert [] == unmet(fleet2d.run(home(*entries(script), expect=expecting(expected))))
 
 
 def test_only_guests_are_let_in():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.scenes import OWN, scenario, table
+from tests.scenes import OWN, entries, scenario, table
 
 import fleet2d
 from fleet2d.errors import ScenarioError
@@ -73,36 +73,38 @@ def readings(run):
     return list(zip(rows["step"].tolist(), rows["state"].tolist(), strict=True))
 
 
+TIMES = "at: 20 min, duration: 10 min"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("max_span", [None, 1])
 def test_a_sensor_says_what_it_is_told_to_say(max_span):
-    plain = readings(fleet2d.run(home(), max_span=max_span))
-    times = {"at": "20 min", "duration": "10 min"}
-    silent = readings(fleet2d.run(home({**times, "stick": "motion"}), max_span=max_span))
-    assert [row for row in plain if not 1200 <= row[0] < 1800] == silent
-    on = readings(fleet2d.run(home({**times, "stick": "motion", "says": "on"}), max_span=max_span))
-    assert 1 >= sum(1200 <= step < 1800 for step, _ in on)
-    assert [row for row in plain if row[0] < 1200] == [row for row in on if row[0] < 1200]
-    off = readings(
-        fleet2d.run(home({**times, "stick": "motion", "says": "off"}), max_span=max_span)
+    plain, silent, on, off = (
+        readings(fleet2d.run(home(*entries(script)), max_span=max_span))
+        for script in (
+            "",
+            f"{TIMES}, stick: motion",
+            f"{TIMES}, stick: motion, says: on",
+            f"{TIMES}, stick: motion, says: off",
+        )
     )
-    assert 1 >= sum(1200 <= step < 1800 for step, _ in off)
+    assert [row for row in plain if not 1200 <= row[0] < 1800] == silent
+    for stuck in (on, off):
+        assert [row for row in plain if row[0] < 1200] == [row for row in stuck if row[0] < 1200]
+        assert 1 >= sum(1200 <= step < 1800 for step, _ in stuck)
 
 
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
-        ({"reset": "shar"}, "did you mean 'share'"),
-        ({"replace": "share"}, "one of 'rooms', 'values'"),
-        ({"replace": "share", "rooms": {"kitchn_1": 1}}, "did you mean 'kitchen_1'"),
-        (
-            {"replace": "share", "rooms": {"kitchen_1": -1}},
-            "rooms.kitchen_1: weight -1 is negative",
-        ),
-        ({"stick": "motio"}, "did you mean 'motion'"),
-        ({"restore": "motio"}, "did you mean 'motion'"),
+        ("reset: shar", "did you mean 'share'"),
+        ("replace: share", "one of 'rooms', 'values'"),
+        ("replace: share, rooms: {kitchn_1: 1}", "did you mean 'kitchen_1'"),
+        ("replace: share, rooms: {kitchen_1: -1}", "rooms.kitchen_1: weight -1 is negative"),
+        ("stick: motio", "did you mean 'motion'"),
+        ("restore: motio", "did you mean 'motion'"),
     ],
 )
 def test_what_can_not_be_is_refused(entry, words):
     with pytest.raises(ScenarioError, match=words):
-        fleet2d.Simulation(home({"at": "1 min", **entry}))
+        fleet2d.Simulation(home(*entries(f"at: 1 min, {entry}")))

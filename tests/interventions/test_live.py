@@ -1,5 +1,6 @@
 """What arrives from outside, as interventions: detections, readings; recorded and repeated."""
 
+import numpy as np
 import pytest
 
 import fleet2d
@@ -28,44 +29,22 @@ def drive(simulation):
         simulation.advance(10)
 
 
-def test_detections_are_observed_at_the_step_of_their_arrival():
-    simulation = fleet2d.Simulation(LIVE)
-    drive(simulation)
-    table = simulation.run().tables["observations"]
-
-    assert table["step"].to_pylist() == [0, 10, 10, 20, 20]
-    assert table["user"].to_pylist() == ["ana", "ana", None, "ana", None]
-    assert set(table["room"].to_pylist()) == {"kitchen_1"}
-    assert table["truth_known"].to_pylist() == [False] * 5
-
-
-def test_readings_are_those_reported():
-    simulation = fleet2d.Simulation(LIVE)
-    drive(simulation)
-    table = simulation.run().tables["sensors"]
-
-    assert list(zip(table["step"].to_pylist(), table["state"].to_pylist(), strict=True)) == [
-        (0, "ON"),
-        (10, "OFF"),
-        (20, "ON"),
-    ]
-
-
-def test_a_live_body_stands_where_it_was_put():
-    simulation = fleet2d.Simulation(LIVE)
-    drive(simulation)
-    path = simulation.run().path("ana")
-
-    assert {(round(x, 2), round(y, 2)) for x, y in zip(path.x, path.y, strict=True)} == {
-        tuple(round(v, 2) for v in place("kitchen_1"))
-    }
-
-
-def test_a_live_run_is_reproduced(tmp_path):
+def test_what_arrives_is_stored_at_its_step_and_repeated(tmp_path):
     simulation = fleet2d.Simulation(LIVE, out=tmp_path / "live")
     drive(simulation)
     run = simulation.run()
 
+    seen = run.pandas("observations")
+    assert seen["step"].tolist() == [0, 10, 10, 20, 20]
+    assert seen["user"].isna().tolist() == [False, False, True, False, True]
+    assert set(seen["room"]) == {"kitchen_1"}
+    assert not seen["truth_known"].any()
+    said = run.pandas("sensors")
+    assert said["step"].tolist() == [0, 10, 20]
+    assert said["state"].tolist() == ["ON", "OFF", "ON"]
+    way = run.path("ana")
+    assert place("kitchen_1") == pytest.approx((way.x[0], way.y[0]), abs=0.01)
+    assert (np.ptp(way.x), np.ptp(way.y)) == (0, 0)
     assert fleet2d.reproduce(tmp_path / "live").digest == run.digest
 
 

@@ -4,8 +4,7 @@ import random
 from datetime import timedelta
 
 import pytest
-import yaml
-from tests.scenes import digests
+from tests.scenes import digests, entries
 from tests.thorough import some
 
 import fleet2d
@@ -150,7 +149,7 @@ keep_out: robot, of: [kitchen, bedroom, bathroom], duration: lasting
 battery: astro, charge: 0
 battery: astro, charge: share
 power: robot, duration: lasting
-power: robot, state: "on"
+power: robot, state: on
 power: robot, state: crash
 power: robot, state: update, duration: lasting
 switch_off: body, camera: true, duration: lasting
@@ -255,7 +254,8 @@ class Chance:
         ways = [line for line in ACTS.splitlines() if line.startswith(f"{verb}: ")]
         subject = None
         fields = {}
-        for key, value in yaml.safe_load(f"{{{self.random.choice(ways)}}}").items():
+        (entry,) = entries(self.random.choice(ways))
+        for key, value in entry.items():
             fields[key] = self.drawn(value, subject)
             subject = subject or fields[key]
         return {key: value for key, value in fields.items() if value is not None}

@@ -1,7 +1,7 @@
 """Faults of robots: what is lost, broken, carried off, or dismissed."""
 
 import pytest
-from tests.scenes import AGENDA, entries, scenario, table, unmet
+from tests.scenes import AGENDA, entries, expecting, scenario, table, unmet
 
 import fleet2d
 from fleet2d.errors import ScenarioError
@@ -74,7 +74,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_what_faults_do_to_a_robot(name):
     script, changes, expected = CASES[name]
-    assert [] == unmet(home(script, **changes), expected)
+    assert [] == unmet(fleet2d.run(home(script, **changes) | {"expect": expecting(expected)}))
 
 
 def test_a_robot_that_is_dismissed_drops_whom_it_follows():

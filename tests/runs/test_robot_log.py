@@ -12,19 +12,17 @@ from fleet2d.engine.repeat import decisions_of
 from fleet2d.errors import InputError
 from fleet2d.runs.robot_log import LogEntry, day_of, log_lines, moves_of, robot_log
 
-SCRIPT = (
-    {"at": "07:05", "power": "astro", "state": "crash", "duration": "2 min"},
-    {"at": "07:20", "fault": "astro", "wheels": True, "duration": "5 min"},
-    {"at": "07:22", "suppress": "astro", "user": "ana"},
-    {"at": "07:50", "power": "astro", "duration": "10 min"},
-)
+SCRIPT = """
+at: 5 min, power: astro, state: crash, duration: 2 min
+at: 20 min, fault: astro, wheels: true, duration: 5 min
+at: 22 min, suppress: astro, user: ana
+at: 50 min, power: astro, duration: 10 min
+"""
 
 
 @cache
 def stored(*, decisions=True):
-    content = home(
-        *SCRIPT, duration="40 h", astro={"battery": BATTERY, "behaviors": ["dock", PATROL]}
-    )
+    content = home(SCRIPT, "40 h", astro={"battery": BATTERY, "behaviors": ["dock", PATROL]})
     content["artifacts"] = {"trajectories": "off", "decisions": decisions}
     return fleet2d.run(content)
 
