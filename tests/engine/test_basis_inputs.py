@@ -39,14 +39,6 @@ def test_a_model_within_an_algorithm_is_noted_with_its_weights(tmp_path):
     assert {flat_path(), tmp_path / "net.py", tmp_path / "weights.npy"} == set(paths)
 
 
-def test_other_weights_are_said_to_have_changed(tmp_path):
-    fleet2d.run(content(tmp_path), out=tmp_path / "run")
-    assert [] == fleet2d.reproduce(tmp_path / "run").causes
-    np.save(tmp_path / "weights.npy", np.full(1, 1.0000001))
-    again = fleet2d.reproduce(tmp_path / "run")
-    assert [f"{tmp_path / 'weights.npy'} has changed since"] == again.causes
-
-
 WAITS = """
 from fleet2d import Behavior
 {imports}

@@ -178,17 +178,6 @@ def test_looks_and_rows_agree():
                 assert looks.detected[camera, user] == rows.sum()
 
 
-def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing():
-    content = scenario(
-        "1 min",
-        users={"ana": {"start": [1.0, 1.0]}},
-        robots={"r": {"start": [0.3, 1.0], "start_heading_deg": 180, "camera": {"angle_deg": 360}}},
-    )
-    assert table(run(content), "observations")["step"].size
-    content["robots"]["r"]["camera"]["offset"] = [0.4, 0]
-    assert not table(run(content), "observations")["step"].size
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [

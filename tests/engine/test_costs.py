@@ -125,16 +125,6 @@ def test_place_where_no_way_leads_is_an_error_that_says_so(tmp_path, change, why
         Simulation(flat_with_a_rug(tmp_path, {}, **change))
 
 
-def test_costmap_that_leaves_no_place_is_an_error(tmp_path):
-    document = flat_document()
-    document["no_go"] = [[[-1, -1], [20, -1], [20, 20], [-1, 20]]]
-    (tmp_path / "all.json").write_text(json.dumps(document))
-    content = flat_with_a_rug(tmp_path, {})
-    content["floorplan"]["path"] = f"{tmp_path}/all.json"
-    with pytest.raises(InputError, match="leave it a place to be"):
-        Simulation(content)
-
-
 class Hop(Behavior):
     """From spot to spot in any room."""
 

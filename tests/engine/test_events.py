@@ -1,13 +1,11 @@
 """Algorithms and metrics that events update: at which steps, with which history, in any spans."""
 
-from datetime import timedelta
-
 import numpy as np
 import pytest
 from tests.scenes import digests, everything, run, table
 from tests.thorough import some
 
-from fleet2d import Algorithm, Behavior, Metric
+from fleet2d import Algorithm, Metric
 
 SENSORS = {
     "hall": {"type": "motion_sensor", "at": [2.5, 2.5], "range": 4},
@@ -40,17 +38,6 @@ class HeardMetric(Metric):
 
     def result(self):
         return {"steps": self.steps}
-
-
-class Watch(Behavior):
-    """Notes at each second of its own how many sightings an algorithm has heard of."""
-
-    records = frozenset({"knows"})
-
-    def decide(self, now):
-        told = now.outputs.get("heard")
-        plan = now.plan().note("knows", str(told["end"] if told else 0))
-        return plan.stay(timedelta(seconds=1))
 
 
 def content(duration="30 min", **sections):
@@ -136,19 +123,3 @@ def test_events_are_the_same_for_every_max_span(whole, span):
     other = whole_run(max_span=span)
     assert digests(whole) == digests(other)
     assert whole.metrics == other.metrics
-
-
-def test_a_behavior_reads_the_output_from_the_next_step_on():
-    stored = run(
-        content(
-            "20 min",
-            algorithms={"heard": heard("user_seen")},
-            robots={"ego": {"camera": None, "behaviors": [Watch()]}},
-        )
-    )
-    made = table(stored, "heard")["step"]
-    rows = table(stored, "events", event="knows")
-    assert len(made) > 3
-    for step, told in zip(rows["step"].tolist(), rows["detail"].tolist(), strict=True):
-        before = made[made < step]
-        assert str(before[-1] + 1 if len(before) else 0) == told

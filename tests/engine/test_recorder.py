@@ -2,7 +2,6 @@
 
 import pytest
 from tests.scenes import digests, everything, run, scenario, table
-from tests.thorough import some
 
 from fleet2d.engine import recorder
 
@@ -17,16 +16,6 @@ def small(**artifacts):
         artifacts=artifacts,
         metrics={"room_share": {"period": "10 min"}},
     )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("span", some([1, None, 13], 3))
-def test_tables_do_not_depend_on_when_rows_are_handed_over(monkeypatch, span):
-    content = everything("30 min", artifacts=DECISIONS)
-    expected = digests(run(content))
-    monkeypatch.setattr(recorder, "MAX_ROWS", 0)
-    monkeypatch.setattr(recorder, "ROWS_PER_BODY", 0)
-    assert expected == digests(run(content, max_span=span))
 
 
 @pytest.mark.slow

@@ -284,13 +284,6 @@ def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_othe
     assert whole.stdout == done.stdout
 
 
-def test_a_file_of_the_same_state_is_the_same_in_any_process(tmp_path):
-    """But for the time that it took until then."""
-    one, other = (open_snapshot(saved(tmp_path / name), PURPOSE) for name in "ab")
-    assert one[0].keys() == other[0].keys()
-    assert one[1].read() == other[1].read()
-
-
 def test_saving_replaces_a_file_and_leaves_nothing_else(tmp_path):
     path = tmp_path / "run.fleet2d"
     path.write_text("old")

@@ -3,7 +3,6 @@
 import functools
 import json
 import os
-from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -101,16 +100,6 @@ def test_chunks_of_any_size_add_up_to_the_same_run(whole):
         simulation.advance(size)
         size = size * 3 % 1009 + 1
     assert digests(whole) == digests(simulation.finish())
-
-
-def test_running_until_times_adds_up_to_the_same_run(whole):
-    simulation = fleet2d.Simulation(everything())
-    simulation.run_until(timedelta(minutes=31, seconds=7, milliseconds=500))
-    assert 31 * 60 + 8 == simulation.step
-    simulation.run_until(simulation.clock.start + timedelta(minutes=50))
-    assert 50 * 60 == simulation.step
-    simulation.run_until(3001)
-    assert digests(whole) == digests(simulation.run())
 
 
 # --- Other processes ---------------------------------------------------------------------------
@@ -229,12 +218,6 @@ def test_an_algorithm_and_a_metric_more_leave_everything_as_it_was(reference):
     assert {k: v for k, v in before.items() if k != "run"} == {
         k: v for k, v in after.items() if k not in ("run", "other")
     }
-
-
-def test_a_robot_that_behaves_otherwise_leaves_the_users_as_they_were(reference):
-    content = alone("40 min")
-    content["robots"]["astro"] = {"type": "meander", "radius": 0.3}
-    assert lives(reference, "ana", "ben") == lives(run(content), "ana", "ben")
 
 
 def test_another_seed_is_another_life(reference):

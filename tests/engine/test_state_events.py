@@ -114,12 +114,6 @@ def test_plans_come_before_cameras_and_the_home_comes_last():
     assert 0 == event(0, "of a behavior's own").rank
 
 
-def test_a_kind_is_its_text():
-    assert "user_seen" == EventKind.USER_SEEN == str(EventKind.USER_SEEN)
-    assert Event(1, "a", EventKind.SHUT, "") == Event(1, "a", "shut", "")
-    assert all(kind.value == kind.name.lower() for kind in EventKind)
-
-
 # --- In runs -----------------------------------------------------------------------------------
 
 

@@ -1,8 +1,5 @@
 """Scripts in a run: when each entry is done, and that nothing else changes."""
 
-import copy
-import io
-
 import pytest
 from tests.scenes import AGENDA, digests, entries, scenario, table
 
@@ -88,21 +85,6 @@ def test_a_run_with_a_script_and_somebody_outside_is_reproduced(tmp_path):
     run.do({"at": "07:30", "shut": "bath_door"})
     run.run()
     assert fleet2d.reproduce(tmp_path / "run").same
-
-
-@pytest.mark.parametrize("way", ["copy", "save"])
-def test_copies_keep_what_a_script_still_waits_for(lively, way):
-    run = fleet2d.Simulation(home(LIVELY))
-    run.advance(500)
-    if way == "copy":
-        twin = copy.deepcopy(run)
-    else:
-        file = io.BytesIO()
-        run.save(file)
-        file.seek(0)
-        twin = fleet2d.Simulation.load(file)
-    assert lively.digest == twin.run().digest
-    assert lively.manifest["interventions"] == twin.finish().manifest["interventions"]
 
 
 def test_a_scenario_without_a_script_waits_for_nothing():

@@ -2,14 +2,12 @@
 
 import math
 from datetime import timedelta
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from tests.thorough import some
 
 import fleet2d
-from fleet2d.entities.steering import Disc, Velocity
 
 SCENE = {
     "extends": "bundled:paper",
@@ -115,19 +113,3 @@ def test_steered_runs_are_the_same_for_every_span(max_span):
     scene = {**SCENE, "script": acts}
     digests = {fleet2d.run(scene, f"simulation.max_span={span}").digest for span in (max_span, 60)}
     assert len(digests) == 1
-
-
-def test_a_disc_lets_only_away_who_is_within_it():
-    disc = Disc(0, 0, 10)
-
-    assert disc.blocks((20, 0), (9, 0))
-    assert disc.blocks((5, 0), (4, 0))
-    assert not disc.blocks((5, 0), (6, 0))
-    assert not disc.blocks((20, 0), (10, 0))
-
-
-def test_speeds_change_by_at_most_what_a_drive_can():
-    fast = Velocity(1.0, 0.0, 30.0)
-    gained = [Velocity().towards(fast, most).forward for most in (0.0, 0.4, 2.0)]
-    assert gained == [0.0, 0.4, 1.0]
-    assert all(a <= b for a, b in pairwise(gained))

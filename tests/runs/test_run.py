@@ -68,17 +68,6 @@ def test_tables_are_read_when_asked_for(directory):
         run.arrow("every_kind")
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [("nowhere", "does not exist"), ("file", "is a file"), (".", "no manifest")],
-)
-def test_open_what_is_no_run(tmp_path, name, message):
-    (tmp_path / "file").write_text("")
-
-    with pytest.raises(RunDirectoryError, match=message):
-        open_run(tmp_path / name)
-
-
 def test_truncated_table_is_named_and_the_rest_opens(directory):
     path = directory / "every_kind.parquet"
     path.write_bytes(path.read_bytes()[:-100])
@@ -124,6 +113,16 @@ def test_crashed_run_opens_with_what_is_whole(tmp_path):
     with pytest.raises(ArtifactError, match="It has: none"):
         run.arrow("every_kind")
     store.discard()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("nowhere", "does not exist"), ("file", "is a file"), (".", "no manifest")],
+)
+def test_open_what_is_no_run(tmp_path, name, message):
+    (tmp_path / "file").touch()
+    with pytest.raises(RunDirectoryError, match=message):
+        open_run(tmp_path / name)
 
 
 def test_run_before_close_is_refused():

@@ -117,22 +117,16 @@ def run_of(bodies, start="midnight", step="1 s", *more):
 
 def assert_rebuilt(run, stride=1):
     """Compare the rebuilt path of every body with the stored poses."""
+    every = timedelta(microseconds=stride * run.manifest["step_us"])
     stored = run.pandas("trajectories")
-    step_us = run.manifest["step_us"]
-    names = [*run.manifest["entities"]["users"], *run.manifest["entities"]["robots"]]
-    for name in names:
-        truth = stored[stored["entity"] == name]
-        truth = truth[truth["step"] % stride == 0]
-        path = run.path(name, every=timedelta(microseconds=stride * step_us))
-        at_home = ~path.away
-        assert truth["step"].tolist() == path.step.tolist()
-        np.testing.assert_array_equal(truth["time"].to_numpy(), path.time, name)
-        np.testing.assert_array_equal(truth["away"], path.away, name)
-        for column in ("x", "y"):
-            result = getattr(path, column)
-            np.testing.assert_array_equal(truth[column].to_numpy()[at_home], result[at_home], name)
-        np.testing.assert_array_equal(truth["heading"], path.heading, name)
+    for name, truth in stored[stored["step"] % stride == 0].groupby("entity", observed=True):
+        path = run.path(name, every=every)
+        for column in ("step", "time", "away", "heading"):
+            np.testing.assert_array_equal(truth[column], getattr(path, column), name)
         np.testing.assert_array_equal(truth["room"].cat.codes, path.room, name)
+        for column in ("x", "y"):
+            result = np.where(path.away, np.nan, getattr(path, column))
+            np.testing.assert_array_equal(truth[column], result, name)
 
 
 @pytest.mark.parametrize("bodies", BODIES)
@@ -269,6 +263,5 @@ def test_times_between_poses_are_durations_or_texts():
 
     apart = run.path("ana", every="10 s")
     assert apart.x.tolist() == run.path("ana", timedelta(seconds=10)).x.tolist()
-    for text, message in (("often", "expected a duration"), ("1.5 s", "not a multiple")):
-        with pytest.raises(ArtifactError, match=message):
-            run.path("ana", every=text)
+    with pytest.raises(ArtifactError, match="expected a duration"):
+        run.path("ana", every="often")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from fleet2d.scenario.schema import ComponentDescription, describe_components, schema
+from fleet2d.scenario.schema import describe_components, schema
 
 pytestmark = pytest.mark.usefixtures("stand_ins")
 
@@ -14,13 +14,10 @@ def written():
     return schema()
 
 
-def test_schema_is_json_and_refuses_unknown_keys(written):
+def test_schema_is_json_that_refuses_unknown_keys_and_lets_files_be_extended(written):
     assert written == json.loads(json.dumps(written))
     assert written["additionalProperties"] is False
     assert "extends" in written["properties"]
-
-
-def test_schema_requires_nothing_that_an_extended_file_may_give(written):
     assert "required" not in written
     assert "required" not in written["$defs"]["SimulationSettings"]
 
@@ -56,7 +53,10 @@ def test_every_reference_of_the_schema_resolves(written):
             place = place[key]
 
 
-def test_keys_that_types_inherit_are_described_once():
+def test_keys_that_types_inherit_are_described_once(written):
+    properties = written["$defs"]["Tour"]["properties"]
+    assert {"$ref": "#/$defs/Behavior/properties/when"} == properties["when"]
+    assert "The hours" in written["$defs"]["Behavior"]["properties"]["when"]["description"]
     described = {(d.kind, d.type): d for d in describe_components()}
 
     for name in ("drift", "tour"):
@@ -67,26 +67,15 @@ def test_keys_that_types_inherit_are_described_once():
     assert ("BodySettings", "Entity") == described["scenario", "Robot"].shares
 
 
-def test_schema_refers_to_inherited_keys(written):
-    properties = written["$defs"]["Tour"]["properties"]
-
-    assert {"$ref": "#/$defs/Behavior/properties/when"} == properties["when"]
-    assert "The hours" in written["$defs"]["Behavior"]["properties"]["when"]["description"]
-
-
 def test_components_are_described_with_units_and_defaults():
     described = {(d.kind, d.type): d for d in describe_components()}
     plan = described["floorplan", "houseexpo"]
     tour = described["behavior", "tour"]
 
+    def fields(of):
+        return [f"{f.name}: {f.type} = {f.default}" for f in of.fields]
+
     assert "A plan in a file." == plan.summary
-    assert [("path", "path", None), ("border", "whole number", "4")] == [
-        (f.name, f.type, f.default) for f in plan.fields
-    ]
-    assert [("cell", "length [m]", "0.05")] == [
-        (f.name, f.type, f.default) for f in described["shared", "Plan"].fields
-    ]
-    assert [("stops", "list of text", "[]"), ("dwell", "duration [s]", "1 min")] == [
-        (f.name, f.type, f.default) for f in tour.fields
-    ]
-    assert all(isinstance(d, ComponentDescription) for d in described.values())
+    assert ["path: path = None", "border: whole number = 4"] == fields(plan)
+    assert ["cell: length [m] = 0.05"] == fields(described["shared", "Plan"])
+    assert ["stops: list of text = []", "dwell: duration [s] = 1 min"] == fields(tour)
