@@ -85,33 +85,33 @@ class Given(Bodies):
 def test_what_happens_is_that_of_the_twin_however_a_run_is_cut(meeting, cuts):
     users, robots = _bodies()
     encounters = Encounters(users, robots)
+    cm, posture, away = (np.array(column) for column in zip(*meeting, strict=True))
     # In the middle of the living room; the robot comes along its long side.
-    x = [4.7 * UNITS - cm * UNITS // 100 for cm, _, _ in meeting]
-    user = round(4.7 * UNITS), round(3.1 * UNITS)
-    xs = [round(v) for v in x]
-    still = np.full(len(xs), user[0]), np.full(len(xs), user[1])
-    zero = np.zeros((2, len(xs)), np.int64)
-    away = zero.astype(np.uint8)
-    away[0] = [away for _, _, away in meeting]
-    posture = zero.astype(np.int8)
-    posture[0] = [posture for _, posture, _ in meeting]
-    x, y = np.array([still[0], xs]), np.array([still[1], still[1]])
-    bodies = Given(PoseBlock(x, y, zero, away, posture))
+    here, y = round(4.7 * UNITS), round(3.1 * UNITS)
+    robot = here - cm * UNITS // 100
+    zero = np.zeros((2, len(cm)), np.int64)
+    x = np.array([zero[0] + here, robot])
+    of_user = np.array([[1], [0]])
+    poses = (
+        x,
+        zero + y,
+        zero,
+        (of_user * away).astype(np.uint8),
+        (of_user * posture).astype(np.int8),
+    )
+    bodies = Given(PoseBlock(*poses))
     result, first, sizes = [], 0, iter(cuts)
-    while first < len(meeting):
-        end = encounters.limit(bodies, min(first + next(sizes, 5), len(meeting)))
+    while first < len(cm):
+        end = encounters.limit(bodies, min(first + next(sizes, 5), len(cm)))
         assert first < end
         for row, event in encounters.interruptions(encounters.take(bodies, end)):
             assert 0 == row
             result.append((end - 1, event.event))
         assert end == encounters.next_step
         first = end
-    moved = np.diff(xs, prepend=xs[0]) != 0
-    steps = [
-        Seen(abs(user[0] - xs[k]) / UNITS, bool(moved[k]), posture, away)
-        for k, (_, posture, away) in enumerate(meeting)
-    ]
-    assert twin(steps) == result
+    moved = np.diff(robot, prepend=robot[0]) != 0
+    columns = (abs(here - robot) / UNITS, moved, posture, away)
+    assert twin([Seen(*step) for step in zip(*columns, strict=True)]) == result
 
 
 _ACTORS = []

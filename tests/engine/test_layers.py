@@ -86,25 +86,22 @@ def watched(duration="10 min", **more):
 
 
 def by_brute_force(stored, robot, camera):
-    """Return how often each cell was in view, first and last: (3, rows, columns)."""
+    """Return how often each cell was in view, and the first and the last step at which it was."""
     plan, poses = stored.plan, path(stored, robot)
-    walls = walls_of(plan.polygons)
-    shape = plan.free.shape
     near, far = (round(limit * plan.lattice.units_per_m) for limit in camera["range"])
     half = round(camera["angle_deg"] / 360 * 4096)
-    known = {}
-    result = np.array([np.zeros(shape), np.full(shape, -1), np.full(shape, -1)], np.int64)
     xy = plan.lattice.to_lattice(np.stack([poses.x, poses.y], axis=1))
-    headings = np.rint(poses.heading / (2 * np.pi) * 4096).astype(int) % 4096
-    for step, (x, y, heading) in enumerate(zip(*xy.T.tolist(), headings.tolist(), strict=True)):
-        pose = (x, y, heading)
-        if pose not in known:
-            known[pose] = slow.cells_in_view(walls, shape, pose, near, far, half, SINES)
-        seen = known[pose]
-        result[0][seen] += 1
-        result[1][seen & (result[1] < 0)] = step
-        result[2][seen] = step
-    return result
+    headings = np.rint(poses.heading / (2 * np.pi) * 4096) % 4096
+    looks, number = np.unique(np.column_stack([xy, headings]), axis=0, return_inverse=True)
+    seen = [
+        slow.cells_in_view(walls_of(plan.polygons), plan.free.shape, look, near, far, half, SINES)
+        for look in looks.astype(int).tolist()
+    ]
+    views = np.array(seen)[number.ravel()]
+    times = views.sum(axis=0)
+    first = np.where(times > 0, views.argmax(axis=0), -1)
+    last = np.where(times > 0, len(views) - 1 - views[::-1].argmax(axis=0), -1)
+    return times, first, last
 
 
 @pytest.fixture(scope="module")
