@@ -547,6 +547,21 @@ def test_a_state_that_power_never_has_is_refused():
 
 # All at random
 
+ACTS = """
+power: {who}, duration: {lasts} s
+power: {who}
+power: {who}, state: crash
+power: {who}, state: update
+power: {who}, state: on
+put: {who}, to: [1.0, 3.0]
+restore: {who}
+kidnap: {who}, to: bathroom
+fault: {who}, lost: true, duration: 4 min
+send: {who}, to: kitchen
+release: {who}
+replan: {who}
+"""
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(40), 8))
@@ -555,29 +570,19 @@ def test_robots_that_go_off_and_on_at_any_time_have_the_same_run_for_every_span(
     content = everything("1 h")
     for robot in content["robots"].values():
         if chance.random() < 0.5:
-            charge = chance.choice([0.2, 0.5, 1])
-            robot["battery"] = {
-                **BATTERY,
-                "driving": f"{chance.randint(3, 30)} min",
-                "charge": charge,
-            }
+            driving, charge = chance.randint(3, 30), chance.choice([0.2, 0.5, 1])
+            robot["battery"] = {**BATTERY, "driving": f"{driving} min", "charge": charge}
         crashes = {"per_day": chance.choice([10, 100]), "lasts": f"{chance.randint(1, 400)} s"}
         persists = chance.choice([None, ["place"], ["map", "share"], []])
         robot["power"] = {"crashes": crashes, "persists": persists}
         if robot.get("camera"):
             fails = {"per_day": 50, "lasts": "3 min"}
             robot["camera"] = {**robot["camera"], "fails": fails, "latency": "2 s"}
-    content["script"] = []
+    acts = ACTS.strip().splitlines()
     for _ in range(12):
         who = chance.choice(list(content["robots"]))
-        more = chance.choice([
-            {"power": who, "duration": f"{chance.randint(1, 900)} s"}, {"power": who},
-            {"power": who, "state": "crash"}, {"power": who, "state": "update"},
-            {"power": who, "state": "on"}, {"put": who, "to": [1.0, 3.0]}, {"restore": who},
-            {"kidnap": who, "to": "bathroom"}, {"fault": who, "lost": True, "duration": "4 min"},
-            {"send": who, "to": "kitchen"}, {"release": who}, {"replan": who},
-        ])  # fmt: skip
-        content["script"].append({"at": f"{chance.randint(0, 3599)} s", **more})
+        act = chance.choice(acts).format(who=who, lasts=chance.randint(1, 900))
+        content.setdefault("script", []).extend(entries(f"at: {chance.randint(0, 3599)} s, {act}"))
     stored = same_for_every_span(content, 1, chance.randint(2, 500))
 
     assert "complete" == stored.status
