@@ -264,10 +264,9 @@ WRONG = {
 
 @pytest.mark.parametrize(("text", "message"), WRONG.items())
 def test_wrong_expectations_are_refused_with_their_line(text, message, tmp_path):
-    written = json.dumps(home(expect={}))[:-1]
-    (tmp_path / "home.yaml").write_text(
-        written.replace(', "expect": {}', "") + f', "expect": {{\n\n"wrong": {json.dumps(text)}}}}}'
-    )
+    (tmp_path / "base.yaml").write_text(json.dumps(home(expect={})))
+    lines = ["extends: base.yaml", "expect:", f"  wrong: {json.dumps(text)}"]
+    (tmp_path / "home.yaml").write_text("\n".join(lines))
     with pytest.raises(ScenarioError, match=r"home\.yaml:3: ") as caught:
         fleet2d.Simulation(tmp_path / "home.yaml")
     assert message in str(caught.value)
