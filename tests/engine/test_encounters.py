@@ -131,5 +131,6 @@ def test_nobody_is_watched_who_does_not_react():
     encounters = Encounters([quiet], robots)
     assert [] == encounters.pairs
     assert not encounters.waits
-    assert 17 == encounters.limit(None, 17)
-    assert () == encounters.take(None, 17)
+    bodies = Given(PoseBlock(*np.zeros((5, 2, 17), np.int64)))
+    assert 17 == encounters.limit(bodies, 17)
+    assert () == encounters.take(bodies, 17)

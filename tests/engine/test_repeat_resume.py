@@ -291,10 +291,10 @@ def test_a_signal_is_heard_and_the_run_goes_on_later(tmp_path, number):
         text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )
-    while not (tmp_path / "run" / FOLDER / JOURNAL_NAME).exists():
+    journal = tmp_path / "run" / FOLDER / JOURNAL_NAME
+    while not journal.exists() or journal.stat().st_size < 1000:  # it has rows of the first steps
         time.sleep(0.05)
         assert run.poll() is None
-    time.sleep(1)
     run.send_signal(number)
     _, heard = run.communicate(timeout=120)
     assert 130 == run.returncode
