@@ -77,7 +77,7 @@ POINTS = np.array([[100, 100], [300, 900], [-5, 2**29], [500, 300]])
 AREAS = np.array([3000.0, 4000.0, 2000.0])
 LIMITS = np.array([[20.0, 3.0]] * 3)
 SLOTS = np.array([[0, -1, 0], [1, 2, 10]])
-WING = (SLOTS.copy(), SLOTS[::-1].copy(), AREAS)
+WING = (SLOTS, SLOTS[::-1], AREAS)
 MASK = np.array([[1, 1, 0, 1], [0, 1, 0, 1], [1, 1, 1, 1]], bool)
 COSTS = np.array([[0, 100, -1, 5], [1000, 0, -1, 0], [0, 0, 0, 20]], np.int32)
 KEY = 2**64 - 3
@@ -141,7 +141,7 @@ def setup():
 
 def floor():
     before_walls = np.stack([_core.corner_sums(MASK)] * 4)
-    return RoomFloor(MASK.copy(), MASK.copy(), before_walls, MASK.astype(np.int64))
+    return RoomFloor(MASK, MASK, before_walls, MASK.astype(np.int64))
 
 
 def record():
@@ -303,14 +303,14 @@ def kept(rows):
 
 
 CALLS = {
-    "Mesh": lambda: (MESH.vertices.copy(), MESH.triangles.copy(), MESH.neighbors.copy()),
-    "Mesh.with_neighbors": lambda: (MESH, MESH.neighbors.copy()),
+    "Mesh": lambda: (MESH.vertices, MESH.triangles, MESH.neighbors),
+    "Mesh.with_neighbors": lambda: (MESH, MESH.neighbors),
     "locate": lambda: (MESH, 100, 100),
     "orient": lambda: (1, 2, 3, 4, 5, 7),
     "contains_triangle": lambda: (MESH, 0, 100, 100),
     "strictly_inside": lambda: (MESH, 100, 100),
     "rasterize_cells": lambda: (MESH, HOME.rows, HOME.columns),
-    "label_triangles": lambda: (MESH.neighbors.copy(),),
+    "label_triangles": lambda: (MESH.neighbors,),
     "half_sine": lambda: (5000,),
     "sine": lambda: (5000,),
     "cosine": lambda: (5000,),
@@ -327,23 +327,23 @@ CALLS = {
     "camera_pose": lambda: (lenses(), 1, 100, 100, 5, SECOND),
     "points_in_view": lambda: (MESH, lenses(), 0, 1, 100, 100, 5, 70, 30),
     "line_of_sight": lambda: (MESH, 100, 100, 0, 300, 900),
-    "nearest_cells_in_sight": lambda: (MESH, MASK.copy(), 100, 100, 300, 9, 3),
+    "nearest_cells_in_sight": lambda: (MESH, MASK, 100, 100, 300, 9, 3),
     "build_fans": lambda: (MESH,),
     "vertices_seen_from_point": lambda: (MESH, 100, 100),
     "vertices_seen_from_vertex": lambda: (MESH, 3),
-    "pairs_in_sight": lambda: (MESH, POINTS.copy(), POINTS[::-1].copy()),
+    "pairs_in_sight": lambda: (MESH, POINTS, POINTS[::-1]),
     "label_frames": lambda: (np.array([[0, 1, -1], [2, 0, -1]], np.int32), 3),
     "fill_from_neighbors": lambda: (np.array([[0, 1, -1], [2, 0, -1]], np.int16),),
-    "spread_labels": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.copy()),
-    "label_parts": lambda: (MASK.copy(), True),
-    "count_steps": lambda: (MASK.copy(), MASK.copy()),
-    "trace_rings": lambda: (MASK.copy(),),
-    "squared_distance": lambda: (MASK.copy(),),
-    "corner_sums": lambda: (MASK.copy(),),
+    "spread_labels": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK),
+    "label_parts": lambda: (MASK, True),
+    "count_steps": lambda: (MASK, MASK),
+    "trace_rings": lambda: (MASK,),
+    "squared_distance": lambda: (MASK,),
+    "corner_sums": lambda: (MASK,),
     "group_places": lambda: (floor(), ~MASK, GroupRule(1, 1, 1, 0, 40, 20, 3)),
     "squarest_rooms": lambda: (
         Divisions(np.array([[-2, 2], [0, 100], [1, 60]]), np.zeros(1, np.int64)),
-        AREAS.copy(),
+        AREAS,
         np.array([0, 0, 90, 60]),
         np.array([[0, 0, 0, 20]]),
     ),
@@ -360,9 +360,9 @@ CALLS = {
         9,
         4,
     ),
-    "is_promising": lambda: (np.array([[0, 0, 0, 60, 50]]), LIMITS.copy()),
-    "strip_rooms": lambda: (SLOTS.copy(), AREAS.copy(), 100, 20, 240),
-    "row_rooms": lambda: (SLOTS.copy(), AREAS.copy(), CorridorRule(2, 24, 0, -1), 100, 20, 240),
+    "is_promising": lambda: (np.array([[0, 0, 0, 60, 50]]), LIMITS),
+    "strip_rooms": lambda: (SLOTS, AREAS, 100, 20, 240),
+    "row_rooms": lambda: (SLOTS, AREAS, CorridorRule(2, 24, 0, -1), 100, 20, 240),
     "wing_rooms": lambda: (*WING, CorridorRule(2, 24, 1, 1), 60, 44, 124),
     "squarest_depth": lambda: (
         *WING,
@@ -370,22 +370,22 @@ CALLS = {
         np.array([56, 90]),
         44,
         124,
-        LIMITS.copy(),
+        LIMITS,
     ),
     "box_sums": lambda: (COSTS.astype(np.int64), 1),
     "climb": lambda: (np.where(MASK, 1, -1).astype(np.int32), MASK.astype(np.int64)),
-    "walking_distance": lambda: (MASK.copy(), np.array([[0, 0], [2, 3]])),
-    "cheapest_cells": lambda: (COSTS.copy(), (2, 3), (0, 0)),
-    "step_cost": lambda: (COSTS.copy(), 0, 0, 0, 1),
-    "leg_cost": lambda: (COSTS.copy(), 5, 5, 200, 150),
+    "walking_distance": lambda: (MASK, np.array([[0, 0], [2, 3]])),
+    "cheapest_cells": lambda: (COSTS, (2, 3), (0, 0)),
+    "step_cost": lambda: (COSTS, 0, 0, 0, 1),
+    "leg_cost": lambda: (COSTS, 5, 5, 200, 150),
     "pull_taut": lambda: (
         MESH,
-        COSTS.copy(),
+        COSTS,
         np.array([[10, 10], [60, 60], [60, 150], [200, 150]]),
     ),
     "visible_region": lambda: (MESH, 200, 200),
     "region_contains": lambda: (MESH, 200, 200, *region(), 210, 300),
-    "region_contains_points": lambda: (MESH, 200, 200, *region(), POINTS.copy()),
+    "region_contains_points": lambda: (MESH, 200, 200, *region(), POINTS),
     "regions_of_cells": lambda: (
         MESH,
         np.array([[1, 1], [2, 5]]),
@@ -393,7 +393,7 @@ CALLS = {
     ),
     "region_outline": lambda: (MESH, 200, 200, *region()),
     "cells_in_view": lambda: (MESH, 200, 200, 5, Reach(0, 90_000, 800), HOME.rows, HOME.columns),
-    "mark_spans": lambda: (np.array([[0, 1, 3], [2, 0, 0]], np.int32), MASK.copy()),
+    "mark_spans": lambda: (np.array([[0, 1, 3], [2, 0, 0]], np.int32), MASK | False),
     "record_coverage": lambda: (setup(), window(), 0, 0, STEPS, empty_pose_cache(8, 2), record()),
     "settle_coverage": lambda: (setup(), empty_pose_cache(8, 2), record().last),
     "trace_track": lambda: (track(), 0, SECOND, poses()),
@@ -419,7 +419,7 @@ CALLS = {
         [0.5],
         np.zeros((3, 4), np.float32),
     ),
-    "time_route": lambda: (POINTS[:2].copy(), 5, 7, 1000.0, 500.0),
+    "time_route": lambda: (POINTS[:2], 5, 7, 1000.0, 500.0),
     "trace_meander": lambda: (
         MESH,
         MESH,
@@ -447,10 +447,10 @@ CALLS = {
     "speeds": lambda: (window(), 0, np.array([5, 5, 0]), np.array([[0, 0, 90, 90, 5]])),
     "sliding_max": lambda: (*signal(), 9, -1, 4, 0.0, 1.0),
     "until": lambda: (*signal(), np.array([0.5, 2.0, -1.0]), 0.0),
-    "points_in_sight": lambda: (MESH, 100, 100, POINTS.copy()),
-    "points_near": lambda: (POINTS.copy(), POINTS[:3].copy(), 500.0),
-    "best_view": lambda: (MESH, POINTS.copy(), POINTS.copy(), 90_000.0, np.eye(2), 0.5),
-    "points_in_reach": lambda: (100, 100, 5, Reach(0, 90_000, 800), POINTS.copy()),
+    "points_in_sight": lambda: (MESH, 100, 100, POINTS),
+    "points_near": lambda: (POINTS, POINTS[:3], 500.0),
+    "best_view": lambda: (MESH, POINTS, POINTS, 90_000.0, np.eye(2), 0.5),
+    "points_in_reach": lambda: (100, 100, 5, Reach(0, 90_000, 800), POINTS),
     "view_queries": lambda: (
         lenses(),
         lenses().widest,
@@ -611,7 +611,7 @@ CALLS = {
     "Legs.mark": lambda: (_core.Legs(), 5, 100, 100, 7, 0),
     "Legs.add": lambda: (_core.Legs(), np.array([[5, 1, 2, 3, 0], [9, 1, 2, 3, 1]])),
     "Legs.turn": lambda: (_core.Legs(), 5, 100, 100, 7, 0, 300, 500.0),
-    "Legs.walk": lambda: (_core.Legs(), 5, 7, POINTS[:2].copy(), 1000.0, 500.0),
+    "Legs.walk": lambda: (_core.Legs(), 5, 7, POINTS[:2], 1000.0, 500.0),
     "Legs.go": lambda: (
         _core.Legs(),
         5,
@@ -716,7 +716,7 @@ CALLS = {
         (0, MESH, None, 1000.0, 500.0, 10**6, lambda *_: None),
         3,
         4,
-        POINTS[:2].copy(),
+        POINTS[:2],
         np.array([1, 2]),
         2,
         kept(1),
@@ -772,7 +772,6 @@ CALLS = {
     ),
     "next_stop": lambda: (MESH, track(), 5),
 }
-"""A call of every function, constructor and method of the core that takes anything."""
 
 
 def named(name):

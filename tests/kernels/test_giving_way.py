@@ -150,22 +150,6 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests):
     assert 10 < found < 115
 
 
-def test_a_body_that_stands_at_a_corner_stays_aside_as_no_way_leads_back():
-    corner = np.array([[0, 0, 0, 0, 0], [20 * SECOND, 0, 0, 0, 0]])
-    timelines = Timelines(1, SECOND)
-    timelines.follow(0, 0, breakpoints(corner), np.zeros(0, np.int64), np.zeros(1, np.int8))
-    body = Yielder(0, MESH, None, 1000.0, 1000.0, BEAT, straight)
-    place = np.array([[900, 1200]])
-    way = timelines.way_by_a_place(body, 2, 4, place, WAITS, 6, kept(1), END)
-    assert way is not None
-    assert rows_of(way) == [
-        [2 * SECOND, 0, 0, 0, 0],
-        [3 * SECOND + SECOND // 2, 900, 1200, 0, 0],
-        [5 * SECOND, 900, 1200, 0, 0],
-        [20 * SECOND, 900, 1200, 0, 0],
-    ]
-
-
 def is_same_way(one, other):
     if one is None or other is None:
         return one is other

@@ -42,19 +42,3 @@ def test_charge_along_a_track_equals_the_slow_twin(legs, level, since, wait, tar
     )
     assert slow.charge_at(track, state, moment) == charge_at(track, state, moment)
     assert slow.falls_to(track, state, target) == charge_falls_to(track, state, target)
-
-
-def test_charge_is_at_the_level_when_it_has_fallen_to_it_and_above_a_microsecond_before():
-    track, state = track_of([(0, 5, 5, 0), (10, 9, 5, 0)]), battery(0.5)
-    moment = charge_falls_to(track, state, 0.25)
-
-    assert moment is not None
-    assert charge_at(track, state, moment) <= 0.25 < charge_at(track, state, moment - 2)
-
-
-def test_charge_rises_to_full_only_at_a_charger_that_works():
-    track = track_of([(0, 0, 0, 0)])
-    levels = [charge_at(track, battery(0.5, is_broken=b), 600 * MINUTE) for b in (False, True)]
-
-    assert [1.0, 0.0] == levels
-    assert charge_falls_to(track, battery(0.5), 0.4) is None

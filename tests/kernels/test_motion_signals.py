@@ -25,7 +25,6 @@ track = st.lists(st.tuples(st.integers(1, 6), spot, spot, st.booleans()), min_si
 bodies = st.lists(track, min_size=2, max_size=2)
 value = st.sampled_from([-inf, -2.0, -1.0, 0.0, 1.0, 2.0, inf])
 values = st.lists(value, min_size=1, max_size=14)
-Track = list[tuple[int, int, int, bool]]
 
 
 def timelines_of(tracks):

@@ -19,9 +19,6 @@ from tests.strategies import quick
 
 from fleet2d.kernels import Breakpoints, Timelines, WalkRule, Window
 
-Pose = tuple[int, int, int, int, int]
-"""x, y, heading, away, posture."""
-
 STEP_US = 1000
 HORIZON = 60
 POSE_TYPES = (np.int64, np.int64, np.int64, np.uint8, np.int8)
@@ -332,13 +329,6 @@ def test_forgotten_steps_are_refused(walks):
                 ask(0, step)
 
 
-def restored(kind, state):
-    """Return a window or timelines with a state."""
-    result = kind.__new__(kind)
-    result.__setstate__(state)
-    return result
-
-
 @pytest.mark.parametrize(
     ("part", "value"),
     [
@@ -362,22 +352,11 @@ def test_states_that_no_window_has_are_refused(part, value):
     def read():
         types = [np.int64, np.int64, *POSE_TYPES]
         arrays = (np.array(each, of) for each, of in zip(state[2:], types, strict=True))
-        return restored(Window, (*state[:2], *arrays))
+        window = Window.__new__(Window)
+        window.__setstate__((*state[:2], *arrays))
+        return window
 
     assert [(7, (2, 2, 2, 2, 2)), (8, (3, 3, 3, 3, 3))] == runs_of(read(), 1)
     state[part] = value
     with pytest.raises(ValueError, match="no state of a window"):
         read()
-
-
-def test_states_that_no_timelines_have_are_refused():
-    bodies, step_us, pieces = resting().__getstate__()
-    assert (5, 6, 7, 0) == restored(Timelines, (bodies, step_us, pieces)).pose(0, 9)
-    ((piece,),) = pieces
-    too_few = *piece[:2], np.zeros(3, np.int64), *piece[3:]
-    for wrong in ([], [[too_few]], [[piece[:2]]], [[(0,) * 8]], "pieces"):
-        with pytest.raises((ValueError, TypeError, RuntimeError, IndexError)):
-            restored(Timelines, (bodies, step_us, wrong))
-    for wrong in ((bodies, 0, pieces), (-1, step_us, pieces), (bodies,), ()):
-        with pytest.raises((ValueError, TypeError, RuntimeError, IndexError)):
-            restored(Timelines, wrong)

@@ -99,14 +99,6 @@ def test_heading_of_vectors_near_a_boundary_is_the_nearest():
         assert {int(heading_of(dx, dy))} == slow.nearest_headings(dx, dy)
 
 
-def test_no_lattice_vector_lies_right_between_two_headings():
-    """So no tie is ever broken: the smallest such vector would be longer than any plan."""
-    for part in range(1, 2 * TURN, 2):
-        c, s = int(half_sine(part + 2 * QUARTER)), int(half_sine(part))
-
-        assert max(abs(c), abs(s)) // np.gcd(c, s) > 2**15
-
-
 @given(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
 def test_turn_between_leads_from_start_to_end(start, end):
     turn = int(turn_between(start, end))

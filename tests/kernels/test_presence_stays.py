@@ -147,24 +147,6 @@ def portable(of):
     )
 
 
-@pytest.mark.parametrize("cut", [1, 3, 6])
-def test_evidence_in_pieces_is_followed_as_at_once(cut):
-    of = case(5, 2, 7, 1)
-    whole_now, whole_shown = of.now.copy(), of.shown.copy()
-    whole = follow(of.model, of.stretches, whole_now, whole_shown)
-    now, shown, places = of.now.copy(), of.shown.copy(), []
-    for a, b in ((0, cut), (cut, 7)):
-        bins, view, views, begin, patch, share = of.stretches
-        here = slice(begin[a], begin[b])
-        part = Stretches(
-            bins[a:b], view[a:b], views, begin[a : b + 1] - begin[a], patch[here], share[here]
-        )
-        places.append(follow(of.model, part, now, shown))
-    assert np.abs(whole - np.concatenate(places)).max() < 1e-14
-    assert np.abs(whole_now - now).max() < 1e-14
-    assert np.array_equal(whole_shown, shown)
-
-
 @pytest.mark.parametrize("stages", [1, 2, 3])
 def test_without_evidence_stages_follow_each_other_by_their_steps(stages):
     of = case(9, stages, 6, 1)

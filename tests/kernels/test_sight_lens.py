@@ -24,18 +24,6 @@ def lenses(**camera):
     return stack_lenses([lens], [False], scene())
 
 
-@quick
-@given(st.integers(0, 4095), st.floats(-1, 1), st.floats(-1, 1), st.floats(-180, 180))
-def test_a_camera_turns_with_its_body(heading, forward, left, mount):
-    stacked = lenses(offset=[forward, left], heading_deg=mount)
-    x, y, towards = camera_pose(stacked, 0, 1000, 2000, heading, 0)
-    angle = 2 * math.pi * heading / 4096
-    along, across = (round(v * UNITS_PER_M) for v in (forward, left))
-    assert 1000 + along * math.cos(angle) - across * math.sin(angle) == pytest.approx(x, abs=0.51)
-    assert 2000 + along * math.sin(angle) + across * math.cos(angle) == pytest.approx(y, abs=0.51)
-    assert (heading + round(mount / 360 * 4096)) % 4096 == towards
-
-
 @pytest.mark.parametrize("pan", [None, {"headings_deg": [-45, 0, 100], "dwell": "7 s"}])
 def test_poses_of_a_camera_at_many_moments_are_those_at_each(pan):
     stacked = lenses(offset=[0.3, -0.2], heading_deg=77, pan=pan)

@@ -8,48 +8,10 @@ from tests.meshed_homes import awkward_points, home_of
 from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import (
-    Reach,
     best_view,
-    half_sine,
-    points_in_reach,
     points_in_sight,
     points_near,
 )
-
-HALVES = [1, 700, 1229, 2047, 2048, 2049, 3000, 4095, 4096]
-
-
-def in_reach(x, y, heading, reach, px, py):
-    """Return the verdict on one point, in plain Python integers."""
-    dx, dy = px - x, py - y
-    if not reach.near_squared <= dx * dx + dy * dy <= reach.far_squared:
-        return False
-
-    def side(half):
-        """Positive: left of a direction [1/8192 of a turn]."""
-        along, up = int(half_sine(half + 2048)), int(half_sine(half))
-        return along * dy - up * dx
-
-    if reach.half_angle >= 4096:
-        return True
-    from_right = side(2 * heading - reach.half_angle) >= 0
-    to_left = side(2 * heading + reach.half_angle) <= 0
-    return (from_right and to_left) if reach.half_angle <= 2048 else (from_right or to_left)
-
-
-@pytest.mark.parametrize("half", HALVES)
-def test_points_in_reach_equal_plain_integers(half):
-    rng = np.random.default_rng(half)
-    x, y = 1000, 700
-    around = rng.integers(-300, 300, (60, 2))
-    along = np.array([(s * d, t * d) for d in (1, 40, 100) for s in (-1, 0, 1) for t in (-1, 0, 1)])
-    points = np.concatenate([around, along]) + np.array([x, y])
-    for heading in (0, 512, 1024, 2048, 3333):
-        for near, far in ((0, 300), (40, 100), (1, 10_000)):
-            reach = Reach(near * near, far * far, half)
-            expected = [in_reach(x, y, heading, reach, *point) for point in points.tolist()]
-            assert expected == points_in_reach(x, y, heading, reach, points).tolist()
-
 
 HALVES_OF_EIGHT = np.array([(1, 0), (0.7, 0.7), (0, 1), (-0.7, 0.7)])
 

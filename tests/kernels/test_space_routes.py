@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from collections import defaultdict
 
 import numpy as np
 import pytest
@@ -17,29 +18,18 @@ from fleet2d.kernels import Corners, Routes
 
 def corners_of(home):
     """Return the nodes of a route graph: reflex corners, and vertices where several walls meet."""
-    into = {tuple(v): [] for v in home.mesh.vertices.tolist()}
-    out_of = {tuple(v): [] for v in home.mesh.vertices.tolist()}
+    into, out_of = defaultdict(list), defaultdict(list)
     for ax, ay, bx, by in home.walls.tolist():
         out_of[ax, ay].append((bx, by))
         into[bx, by].append((ax, ay))
-    vertex, before, after, simple = [], [], [], []
-    for i, v in enumerate(home.mesh.vertices.tolist()):
-        a, b = into[tuple(v)], out_of[tuple(v)]
-        if not a:  # another ring's corner in the middle of a wall
-            continue
-        alone = len(a) == 1
-        turn = (v[0] - a[0][0]) * (b[0][1] - v[1]) - (v[1] - a[0][1]) * (b[0][0] - v[0])
-        if not alone or turn < 0:
-            vertex.append(i)
-            before.append(a[0])
-            after.append(b[0])
-            simple.append(alone)
-    return Corners(
-        np.array(vertex, np.int64),
-        np.array(before, np.int64).reshape(-1, 2),
-        np.array(after, np.int64).reshape(-1, 2),
-        np.array(simple, np.bool_),
-    )
+    rows = []
+    for i, (x, y) in enumerate(home.mesh.vertices.tolist()):
+        alone = len(into[x, y]) == 1
+        for (ax, ay), (bx, by) in zip(into[x, y][:1], out_of[x, y][:1], strict=True):
+            if not alone or (x - ax) * (by - y) < (y - ay) * (bx - x):
+                rows.append((i, ax, ay, bx, by, alone))
+    vertex, *ends, simple = np.array(rows, np.int64).reshape(-1, 6).T
+    return Corners(vertex, np.stack(ends[:2], 1), np.stack(ends[2:], 1), simple.astype(np.bool_))
 
 
 def routes_of(home):

@@ -10,8 +10,6 @@ from tests.reference.routes import length_of, straight_ways
 
 from fleet2d.kernels import CELL_CENTRE, SUB
 
-Place = tuple[int, int]
-
 
 def is_clear(disc, a, b, *, may_leave):
     """Return whether a straight leg keeps clear of a disc, or leaves it if that is allowed."""

@@ -1,12 +1,10 @@
-"""What expectations are worth at each step, step by step, in slow and obvious Python."""
+"""What expectations are worth at each step, step by step, in slow and obvious Python.
+
+Formulas are ("is", name), ("above", name, limit), ("not", f), ("and", f, g), ("always", f, steps or None), …
+"""
 
 from math import inf
 from sys import float_info
-from typing import Any
-
-Steps = int | tuple[int, int] | None
-Formula = tuple[Any, ...]
-"""("is", name), ("above", name, limit), ("not", f), ("and", f, g), ("always", f, steps or None), …"""
 
 
 def robustness(

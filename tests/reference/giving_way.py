@@ -1,7 +1,10 @@
-"""How a body goes on when somebody is in its way, row by row and place by place: slow and obvious."""
+"""How a body goes on when somebody is in its way, row by row and place by place: slow and obvious.
+
+Rows are [time, x, y, heading, away]. A delay tells after which moment it counts, since when the body is
+late, by how much, and up to when.
+"""
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -32,12 +35,6 @@ def next_stop(rows, moment):
         if here[1:3] == after[1:3] and after[0] > moment and i >= len(begun) - 1:
             return i
     return -1
-
-
-Walk = Callable[[Row, list[int]], list[Row] | None]
-"""The rows of a way from a row to a place; None if no way leads there."""
-Delay = tuple[int, int, int, int]
-"""After which moment it counts, since when it is late, by how much, and up to when."""
 
 
 def rested(way, until, beat):

@@ -3,11 +3,12 @@
 Walls are int64 (w, 4): ax, ay, bx, by. Nothing here may import the package under test.
 """
 
+import math
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 
-Point = tuple[int, int]
 CELL, CELL_CENTRE = 64, 33
 
 
@@ -112,16 +113,14 @@ def visible_area(walls, eye):
 
     Between two neighboring directions in which a wall ends, one wall is the nearest all the way.
     """
-    ends = {(int(x) - eye[0], int(y) - eye[1]) for x, y in walls.reshape(-1, 2)}
-    directions = sorted(ends, key=_Turn)
-    distinct = [
-        d for i, d in enumerate(directions) if i == 0 or _Turn(directions[i - 1]) < _Turn(d)
-    ]
-    moved = [((a - eye[0], b - eye[1]), (c - eye[0], d - eye[1])) for a, b, c, d in walls.tolist()]
+    moved = walls - np.tile(eye, 2)
+    ends = moved.reshape(-1, 2)
+    directions = np.unique(ends // np.gcd.reduce(ends, axis=1)[:, None], axis=0).tolist()
+    directions.sort(key=lambda d: math.atan2(d[1], d[0]))
     area = Fraction(0)
-    for right, left in zip(distinct, distinct[1:] + distinct[:1], strict=True):
+    for right, left in pairwise([*directions, directions[0]]):
         reached = []
-        for a, b in moved:
+        for a, b in moved.reshape(-1, 2, 2).tolist():
             reaches = [_reach(ray, a, b) for ray in (right, left)]
             spans = cross(*a, *right) >= 0 <= cross(*right, *b) and cross(*left, *b) >= 0
             if spans and cross(*a, *left) >= 0 and None not in reaches and cross(*a, *b) > 0:
@@ -138,28 +137,12 @@ def _reach(ray, a, b):
     return Fraction(cross(*a, *edge), down) if down else None
 
 
-class _Turn:
-    """Orders directions by their angle in [0, one turn), in integers."""
-
-    def __init__(self, direction):
-        self.x, self.y = direction
-        self.half = 0 if self.y > 0 or (self.y == 0 and self.x > 0) else 1
-
-    def __lt__(self, other):
-        if self.half != other.half:
-            return self.half < other.half
-        return cross(self.x, self.y, other.x, other.y) > 0
-
-
 def nearest_cells_in_sight(walls, cells, eye, reach, most, wanted):
     """Sort all cells of the mask by their distance, and look at those that are near enough."""
-    near = []
-    for row, column in np.argwhere(cells).tolist():
-        x, y = CELL * column + CELL_CENTRE, CELL * row + CELL_CENTRE
-        away = (x - eye[0]) ** 2 + (y - eye[1]) ** 2
-        if away <= reach**2:
-            near.append((away, row, column, x, y))
-    near = sorted(near)[:most]
-    places = np.array([cell[3:] for cell in near], np.int64).reshape(-1, 2)
-    seen = visible(walls, np.array(eye), places)
-    return [cell[1:3] for cell, is_seen in zip(near, seen, strict=True) if is_seen][:wanted]
+    near = np.argwhere(cells)
+    places = CELL * near[:, ::-1] + CELL_CENTRE
+    away = ((places - eye) ** 2).sum(axis=1)
+    order = np.argsort(away, kind="stable")
+    order = order[away[order] <= reach**2][:most]
+    seen = visible(walls, np.array(eye), places[order])
+    return near[order][seen][:wanted].tolist()

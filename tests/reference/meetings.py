@@ -1,12 +1,11 @@
-"""Meetings of bodies, by looking at a hundred moments of each step: slow and obvious."""
+"""Meetings of bodies, by looking at a hundred moments of each step: slow and obvious.
 
-from collections.abc import Callable
+A way returns x and y at a moment [steps].
+"""
 
 import numpy as np
 
 MOMENTS = 100
-Way = Callable[[float], tuple[float, float]]
-"""Where a body is at a moment [steps]: x and y."""
 
 
 def first_meeting(body, other, near, first, end):

@@ -1,4 +1,7 @@
-"""Slow, obvious twins of the motion kernels: fractions, and a look at every wall."""
+"""Slow, obvious twins of the motion kernels: fractions, and a look at every wall.
+
+Tracks have rows (time [us], x, y, heading, away).
+"""
 
 import math
 from fractions import Fraction
@@ -8,8 +11,6 @@ from tests.reference.headings import cosine, sine
 from tests.reference.line_of_sight import visible
 from tests.reference.random import random_bell, random_below
 
-Row = tuple[int, int, int, int, int]
-"""A breakpoint: time [us], x, y, heading, away."""
 Pose = tuple[int, int, int, int]
 """x, y, heading, away."""
 

@@ -1,13 +1,13 @@
-"""Slow, obvious twin of the kernel that finds where furniture cuts the space of a body."""
+"""Slow, obvious twin of the kernel that finds where furniture cuts the space of a body.
+
+Extents are the least x, y, x + y and x - y, and the greatest ones.
+"""
 
 from itertools import combinations, pairwise
 
 import numpy as np
 import shapely
 from shapely import Polygon
-
-Extents = list[int]
-"""Least x, y, x + y and x - y, and the greatest ones."""
 
 
 def grown(points, reach, half):

@@ -9,8 +9,6 @@ NO_GAP_S = 300
 MILLION = 1_000_000
 ORDERS = 5  # drawn before a job is left out
 
-Row = tuple[int, int, int, int, int]
-
 
 class RoomTimes:
     """When rooms are in use, as `fleet2d.kernels.RoomUse`."""

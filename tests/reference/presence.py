@@ -1,7 +1,7 @@
 """Slow, obvious twins of the estimators and measures of presence: loops, and all paths of a chain."""
 
 import math
-from itertools import pairwise, permutations, product
+from itertools import pairwise, permutations
 
 import numpy as np
 from scipy.optimize import linprog
@@ -11,28 +11,24 @@ WEEK = 10_080
 
 def sighting_share(seen):
     """Sightings per room by all sightings; seen[bin][room] of one user."""
-    rooms = len(seen[0])
-    counts = [sum(bin_[room] for bin_ in seen) for room in range(rooms)]
-    return [c / sum(counts) for c in counts] if sum(counts) else [1 / rooms] * rooms
+    counts = np.sum(seen, axis=0)
+    return list(counts / counts.sum() if counts.any() else np.full(len(counts), 1 / len(counts)))
 
 
 def exposure_ratio(seen, watched, bin_steps, detection):
     """Sightings by exposure with one bin of average beforehand; shares at home, and away."""
-    rooms = range(len(seen[0]))
-    n = [sum(b[r] for b in seen) / bin_steps for r in rooms]
-    e = [sum(b[r] for b in watched) for r in rooms]
-    average = sum(n) / sum(e) if sum(e) else 0.0
-    rate = [(n[r] + average) / (e[r] + 1) for r in rooms]
-    if not sum(rate):
-        return [1 / len(rate)] * len(rate), 1.0 if sum(e) else 0.0
-    return [x / sum(rate) for x in rate], max(0.0, 1 - sum(rate) / detection)
+    n, e = np.sum(seen, axis=0) / bin_steps, np.sum(watched, axis=0)
+    average = n.sum() / e.sum() if e.any() else 0.0
+    rate = (n + average) / (e + 1)
+    if not rate.any():
+        return [1 / len(rate)] * len(rate), float(e.any())
+    return list(rate / rate.sum()), max(0.0, 1 - rate.sum() / detection)
 
 
 def stays(model, bins, shown, seen, shown_before):
     """A person's chain written out: transitions and evidence between all states, for each stretch.
 
-    States are stage of a stay, patch, and whether in the part of the patch that is in view, in
-    that order: number (stage * patches + patch) * 2 + (1 if out of view).
+    States are stage of a stay, patch, and whether out of the part of the patch that is in view.
 
     Args:
         model: stay, follow, spread, restless, first, detection.
@@ -43,56 +39,47 @@ def stays(model, bins, shown, seen, shown_before):
     """
     places, patches = len(model.first) - 1, len(model.spread)
     stages = len(model.stay) // places
-    room = [max(r for r in range(places) if model.first[r] <= p) for p in range(patches)]
+    room = np.repeat(np.arange(places), np.diff(model.first))
     steps, weights = [], []
-    for t, n in enumerate(bins):
-        step = np.zeros((stages * patches * 2,) * 2)
-        weight = np.zeros(stages * patches * 2)
-        views = [x / 255 for x in shown[t]]
-        before = shown[t - 1] if t else shown_before
-
-        def comes(row, stage, into, chance, views=views):
-            for p in range(patches):
-                if room[p] == into:
-                    at = (stage * patches + p) * 2
-                    row[at] += chance * model.spread[p] * views[p]
-                    row[at + 1] += chance * model.spread[p] * (1 - views[p])
-
-        for s, p, side in product(range(stages), range(patches), range(2)):
-            row, k = step[(s * patches + p) * 2 + side], room[p] * stages + s
+    for n, now, before, hits in zip(bins, shown, [shown_before, *shown], seen, strict=False):
+        in_view = np.array(now) / 255
+        sides = np.stack([in_view, 1 - in_view], axis=1)
+        spread = model.spread[:, None] * sides
+        step = np.zeros((stages, patches, 2) * 2)
+        for s, p, side in np.ndindex(stages, patches, 2):
+            row, k, here = step[s, p, side], room[p] * stages + s, room == room[p]
             kept, calm = model.stay[k] ** n, (1 - model.restless[room[p]]) ** n
             onward = (1 - kept) * model.follow[k][places]
             for stage, chance in ((s, kept * calm), (s + 1, onward)):
-                if chance and shown[t][p] == before[p]:
-                    row[(stage * patches + p) * 2 + side] += chance
+                if chance and now[p] == before[p]:
+                    row[stage, p, side] += chance
                 elif chance:
-                    row[(stage * patches + p) * 2] += chance * views[p]
-                    row[(stage * patches + p) * 2 + 1] += chance * (1 - views[p])
-            comes(row, s, room[p], kept * (1 - calm))
-            for into in range(places):
-                comes(row, 0, into, (1 - kept) * model.follow[k][into])
-            missed = (1 - model.detection) ** n if side == 0 else 1.0
-            hit = seen[t][p] if (side == 0) == (shown[t][p] > 0) else 0.0
-            weight[(s * patches + p) * 2 + side] = hit + 1e-3 * missed if sum(seen[t]) else missed
-        steps.append(step)
-        weights.append(weight)
+                    row[stage, p] += chance * sides[p]
+            row[s, here] += kept * (1 - calm) * spread[here]
+            row[0] += (1 - kept) * model.follow[k][room][:, None] * spread
+        weight = np.ones((stages, patches, 2))
+        weight[..., 0] = (1 - model.detection) ** n
+        if any(hits):
+            hit = np.where(np.arange(2) == (in_view[:, None] == 0), np.array(hits)[:, None], 0)
+            weight = hit + 1e-3 * weight
+        steps.append(step.reshape([stages * patches * 2] * 2))
+        weights.append(weight.ravel())
     return steps, weights
+
+
+def _shares(values):
+    return values / values.sum()
 
 
 def posteriors(steps, weights, start, end):
     """Filtered and smoothed probabilities of the states of a chain, by products of matrices."""
-    count = len(steps)
-    forward = [np.asarray(start)]
+    forward, backward = [np.asarray(start)], [np.asarray(end)]
     for step, weight in zip(steps, weights, strict=True):
-        now = forward[-1] @ step * weight
-        forward.append(now / now.sum())
-    backward = [np.asarray(end)]
+        forward.append(_shares(forward[-1] @ step * weight))
     for step, weight in zip(steps[::-1], weights[::-1], strict=True):
-        before = step @ (weight * backward[-1])
-        backward.append(before / before.sum())
-    backward = backward[::-1]
-    both = [forward[t + 1] * backward[t + 1] for t in range(count)]
-    return np.array(forward[1:]), np.array([b / b.sum() for b in both])
+        backward.append(_shares(step @ (weight * backward[-1])))
+    pairs = zip(forward[1:], backward[-2::-1], strict=True)
+    return np.array(forward[1:]), np.array([_shares(before * later) for before, later in pairs])
 
 
 def people(model, day, prior, future):
@@ -104,20 +91,16 @@ def people(model, day, prior, future):
         prior: Of each person by stage and patch, out of view.
         future: Likelihood of later evidence, of each person by stage and patch.
     """
-    chains = []
-    for person in range(len(model.stay)):
-        seen = np.zeros((len(day.view), day.views.shape[1]))
-        for i in np.flatnonzero(day.user == person).tolist():
-            seen[day.bin[i], day.patch[i]] = day.steps[i]
+    shown = day.views[day.view].tolist()
+    for person, own in enumerate(zip(*model[:4], strict=True)):
+        seen, mine = np.zeros((len(day.view), day.views.shape[1])), day.user == person
+        seen[day.bin[mine], day.patch[mine]] = day.steps[mine]
         seen /= np.maximum(seen.sum(axis=1, keepdims=True), 1)
-        parts = (model.stay, model.follow, model.spread, model.restless)
-        own = type(model)(*(part[person] for part in parts), model.first, model.detection)
-        shown = day.views[day.view].tolist()
-        chain = stays(own, [1] * len(shown), shown, seen.tolist(), [-1] * seen.shape[1])
+        before = [-1] * seen.shape[1]
+        chain = stays(type(model)(*own, *model[4:]), [1] * len(shown), shown, seen.tolist(), before)
         start = np.stack([np.zeros_like(prior[person]), prior[person]], axis=-1)
         end = np.stack([future[person]] * 2, axis=-1)
-        chains.append(posteriors(*chain, start.ravel(), end.ravel()))
-    return chains
+        yield posteriors(*chain, start.ravel(), end.ravel())
 
 
 def fremen(minutes, state, days, m, at):
@@ -192,15 +175,15 @@ def classwise_error(p, truth, masses):
 
 def murphy(p, truth):
     """Reliability, resolution and uncertainty, grouped by what exactly was said of each place."""
-    n, reliability, resolution, uncertainty = len(truth), 0.0, 0.0, 0.0
-    for c in range(len(p[0])):
-        mean = sum(t == c for t in truth) / n
-        uncertainty += mean * (1 - mean)
-        for value in {row[c] for row in p}:
-            group = [t == c for row, t in zip(p, truth, strict=True) if row[c] == value]
-            share = sum(group) / len(group)
-            reliability += len(group) / n * (value - share) ** 2
-            resolution += len(group) / n * (share - mean) ** 2
+    reliability = resolution = uncertainty = 0.0
+    for c, said in enumerate(np.transpose(p)):
+        came = np.equal(truth, c)
+        uncertainty += came.mean() * (1 - came.mean())
+        for value in set(said.tolist()):
+            group = came[said == value]
+            part = len(group) / len(truth)
+            reliability += part * (value - group.mean()) ** 2
+            resolution += part * (group.mean() - came.mean()) ** 2
     return reliability, resolution, uncertainty
 
 

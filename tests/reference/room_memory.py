@@ -1,9 +1,9 @@
-"""What a robot remembers of people in rooms, one sighting and one number at a time."""
+"""What a robot remembers of people in rooms, one sighting and one number at a time.
+
+Sightings are (step, identity, room).
+"""
 
 import numpy as np
-
-Sighting = tuple[int, int, int]
-"""Step, identity, room."""
 
 
 def memory_of(sightings, people, rooms, start_s):

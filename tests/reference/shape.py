@@ -1,9 +1,10 @@
 """Slow, obvious twin of `fleet2d.floorplan.rooms.shape`."""
 
 import math
-from itertools import product
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt, label
+from scipy.signal import convolve2d
 
 from fleet2d.floorplan.rooms.shape import (
     ACROSS_SHARE,
@@ -15,15 +16,12 @@ from fleet2d.floorplan.rooms.shape import (
     without_furniture,
 )
 
-Cell = tuple[int, int]
-
 
 def parts_by_shape(room_of_cell, cell, limits):
     """Walk up from every cell, then join the parts most open to each other, pair by pair."""
     rooms = cells_of(room_of_cell)
-    space = cells_of(without_furniture(room_of_cell.astype(np.int32), cell).astype(np.int64))
     reach = round(SMOOTHED_M / cell)
-    height = heights(space, rooms, reach)
+    height = heights(without_furniture(room_of_cell.astype(np.int32), cell), reach)
     part = {at: top_above(at, rooms, height) for at in rooms}
     scale = FINE * (2 * reach + 1) ** 2
     part |= arms(part, height, cell, scale)
@@ -69,28 +67,20 @@ def highest_passes(part, rooms, height):
 
 def arms(part, height, cell, scale):
     """Return the arms of the parts, numbered after all other parts."""
-    found = {}
+    found, count = {}, 0
     for top in sorted(set(part.values())):
         inside = [at for at in part if part[at] == top]
         least = int(ARM_SHARE * max(1, *(height[at] for at in inside)))
         wide = [at for at in inside if height[at] >= least] or [top]
-        left = {at for at in inside if min(math.dist(at, w) for w in wide) * scale >= least}
-        while left:
-            piece = [min(left)]
-            left.remove(piece[0])
-            for row, column in piece:
-                for at in (
-                    (row, column + 1),
-                    (row + 1, column),
-                    (row, column - 1),
-                    (row - 1, column),
-                ):
-                    if at in left:
-                        left.remove(at)
-                        piece.append(at)
-            if len(piece) * cell**2 >= ARM_M2:
-                number = len(set(found.values()))
-                found |= dict.fromkeys(piece, (max(part)[0] + 1, number))
+        is_far = np.zeros(np.max(list(part), axis=0) + 1, bool)
+        for at in inside:
+            is_far[at] = min(math.dist(at, w) for w in wide) * scale >= least
+        pieces, _ = label(is_far)
+        for piece in range(1, pieces.max() + 1):
+            cells = list(map(tuple, np.argwhere(pieces == piece).tolist()))
+            if len(cells) * cell**2 >= ARM_M2:
+                found |= dict.fromkeys(cells, (max(part)[0] + 1, count))
+                count += 1
     return found
 
 
@@ -100,30 +90,16 @@ def cells_of(labels):
     }
 
 
-def heights(space, rooms, reach):
+def heights(space, reach):
     """Measure the distance to each place outside, and weigh what lies around each cell."""
-    inside = {
-        (row, column)
-        for (row, column), room in space.items()
-        if all(space.get(beside, room) == room for beside in ((row, column + 1), (row + 1, column)))
-    }
-    limit = range(-1, 2 + max(max(at) for at in space))
-    outside = [at for at in product(limit, limit) if at not in inside]
-    distance = {
-        at: math.floor(FINE * min(math.dist(at, other) for other in outside)) for at in inside
-    }
+    inside = np.pad(space >= 0, 1)
+    for axis in (0, 1):
+        after = np.roll(np.pad(space, 1, constant_values=-1), -1, axis)[1:-1, 1:-1]
+        inside[1:-1, 1:-1] &= (after < 0) | (after == space)
+    distance = np.floor(FINE * distance_transform_edt(inside)).astype(np.int64)
     width = 2 * reach + 1
-    around = list(product(range(1 - width, width), repeat=2))
-    return {
-        (row, column): sum(
-            (width - abs(down))
-            * (width - abs(right))
-            * distance.get((row + down, column + right), 0)
-            for down, right in around
-        )
-        // width**2
-        for row, column in rooms
-    }
+    weight = width - np.abs(np.arange(1 - width, width))
+    return convolve2d(distance, np.outer(weight, weight), "same")[1:-1, 1:-1] // width**2
 
 
 def top_above(at, rooms, height):

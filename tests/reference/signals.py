@@ -1,12 +1,10 @@
-"""Distances, speeds and windows over time, step by step, in slow and obvious Python."""
+"""Distances, speeds and windows over time, step by step, in slow and obvious Python.
+
+Poses are (x, y, away), edges (x, y, x, y). Portals have the x and y of their ends, and how far from them
+bodies stand.
+"""
 
 from math import inf, sqrt
-
-Edge = tuple[int, int, int, int]
-Pose = tuple[int, int, bool]
-"""x, y, away."""
-Portal = tuple[int, int, int, int, int]
-"""The x and y of its ends, and how far from them bodies stand."""
 
 
 def distance(one, other):
