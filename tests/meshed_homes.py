@@ -1,7 +1,7 @@
 """Homes for the tests of meshes and sight: HouseExpo files, pieces of walls, shuffled meshes."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,9 +12,7 @@ from shapely.geometry import Polygon
 from tests.thorough import some
 
 from fleet2d.floorplan.mesh import build_mesh, snap_polygon
-from fleet2d.kernels import F64, I64, Mesh, rasterize_cells
-
-Turn = Callable[[F64], F64]
+from fleet2d.kernels import I64, Mesh, rasterize_cells
 
 SUB = 64
 CELL_M = 0.05
@@ -90,26 +88,6 @@ def plan_files(shared_data: Path) -> list[Path]:
 def all_homes(shared_data: Path) -> Iterator[Home]:
     """Yield the homes of `plan_files`."""
     return map(houseexpo, plan_files(shared_data))
-
-
-def transformed(home: Home, turn: Turn) -> Home:
-    """Return the home with every corner moved by `turn`."""
-    return home_of([shapely.transform(p, turn) for p in home.polygons])
-
-
-def turns(home: Home) -> Iterator[Turn]:
-    """Yield the eight ways to turn and mirror the square that holds the home."""
-    size = SUB * max(home.columns, home.rows)
-    for mirrored in (False, True):
-        for quarters in range(4):
-
-            def turn(points: F64, quarters: int = quarters, mirrored: bool = mirrored) -> F64:
-                x, y = points[:, 0], points[:, 1]
-                for _ in range(quarters):
-                    x, y = size - y, x
-                return np.stack([size - x if mirrored else x, y], axis=1)
-
-            yield turn
 
 
 def shuffled(mesh: Mesh, rng: np.random.Generator, rounds: int = 8) -> Mesh:

@@ -5,15 +5,14 @@ import math
 import numpy as np
 import pytest
 from shapely import box
+from tests.kernels.scenes import breakpoints, following
 from tests.meshed_homes import home_of
 from tests.reference import giving_way as slow
 
 from fleet2d.kernels import (
     AsideSearch,
     BodyInWay,
-    Breakpoints,
     Distances,
-    Timelines,
     Yielder,
     next_stop,
 )
@@ -25,11 +24,6 @@ BEAT = 3 * SECOND // 2
 NO_DISCS = np.zeros((0, 3), np.int64)
 MESH = home_of([box(0, 0, 4096, 4096)]).mesh
 WAITS = np.array([1, 4])
-
-
-def breakpoints(rows):
-    time, x, y, heading, away = np.ascontiguousarray(rows.T)
-    return Breakpoints(time, x, y, heading, away.astype(np.uint8))
 
 
 def random_rows(random):
@@ -65,9 +59,7 @@ def scenes(count):
     random = np.random.default_rng(51)
     for _ in range(count):
         tracks = [random_rows(random) for _ in range(3)]
-        timelines = Timelines(3, SECOND)
-        for row, rows in enumerate(tracks):
-            timelines.follow(row, 0, breakpoints(rows), np.zeros(0, np.int64), np.zeros(1, np.int8))
+        timelines = following(list(map(breakpoints, tracks)))
         step = int(random.integers(0, 20))
         yield random, timelines, tracks, step
 
@@ -130,14 +122,10 @@ def test_a_body_goes_on_by_the_first_place_that_lets_it(rests):
                 if back is None:
                     continue
                 track += back.tolist()
-                since = max(goal[0], now)
-                leaves = max(since, -(-track[-1][0] // BEAT) * BEAT)
-                if stop >= 0 and track[-1][0] < leaves:
-                    track.append([leaves, *track[-1][1:]])
-                rest = rows[stop + 1 :].tolist() if stop >= 0 else []
-                later = track[-1][0] - since
-                track += slow.delayed(rest, since, track[-1][1:], later)[0]
-                tracks.append(track)
+                since, first = max(goal[0], now), len(rows)
+                if stop >= 0:
+                    track, first = slow.rested(track, since, BEAT), stop + 1
+                tracks.append(slow.going_on(track, rows.tolist(), now, since, first)[0])
             expected = slow.first_free(tracks, is_free)
             if expected is None and rests and tracks:
                 expected = tracks[-1]
@@ -256,8 +244,7 @@ def rests(random, count):
     """Yield tracks of a body with many stops, its timelines, a step, and when it meets another."""
     for _ in range(count):
         rows = random_rest(random)
-        timelines = Timelines(1, SECOND)
-        timelines.follow(0, 0, breakpoints(rows), np.zeros(0, np.int64), np.zeros(1, np.int8))
+        timelines = following([breakpoints(rows)])
         step = int(random.integers(0, 20))
         met = int(random.integers(step, step + 4)) * SECOND
         yield rows, timelines, step, met

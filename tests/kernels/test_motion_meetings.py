@@ -3,10 +3,11 @@
 import copy
 
 import numpy as np
+from tests.kernels.scenes import STANDING, breakpoints, following
 from tests.reference.meetings import first_meeting
 from tests.thorough import examples
 
-from fleet2d.kernels import Breakpoints, Distances, Timelines
+from fleet2d.kernels import Distances
 
 SECOND = 10**6
 STEPS = 30
@@ -18,21 +19,15 @@ def random_track(random, size):
     times = np.sort(random.choice(STEPS, 6, replace=False)).astype(np.int64)
     points = random.integers(0, size, (6, 2))
     points[2] = points[1]
-    zeros = np.zeros(6, np.int64)
-    track = Breakpoints(times * SECOND, points[:, 0], points[:, 1], zeros, zeros.astype(np.uint8))
-    return track, lambda t: tuple(float(np.interp(t, times, points[:, k])) for k in (0, 1))
+    rows = np.column_stack([times * SECOND, points, np.zeros((6, 2), np.int64)])
+    return breakpoints(rows), lambda t: tuple(
+        float(np.interp(t, times, points[:, k])) for k in (0, 1)
+    )
 
 
 def distances(rows, lead=0, counts=0):
     whole = np.ones((rows, 2), np.int64)
     return Distances(whole * lead, whole * NEAR, whole * 0, np.full((rows, 2), counts, np.uint8))
-
-
-def follow(tracks):
-    timelines = Timelines(len(tracks), SECOND)
-    for row, track in enumerate(tracks):
-        timelines.follow(row, 0, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
-    return timelines
 
 
 def test_meetings_are_those_seen_at_many_moments():
@@ -41,7 +36,7 @@ def test_meetings_are_those_seen_at_many_moments():
     cases = examples(150)
     for case in range(cases):
         (one, way), (other, others_way) = (random_track(random, 3000) for _ in range(2))
-        timelines = follow([one, other])
+        timelines = following([one, other])
         first = case % 5
         expected = first_meeting(way, others_way, NEAR, first, STEPS)
         found = timelines.meetings(np.array([0, 1]), distances(2), first, STEPS)
@@ -59,9 +54,9 @@ def test_meetings_are_those_seen_at_many_moments():
 
 
 def test_a_lead_lets_a_body_react_before_and_not_before_the_first_step():
-    still = Breakpoints(np.array([0]), *(np.array([v]) for v in (5000, 0, 0)), np.array([0], np.uint8))  # fmt: skip
-    comes = Breakpoints(np.array([0, 10 * SECOND]), np.array([0, 10_000]), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(2, np.uint8))  # fmt: skip
-    timelines = follow([still, comes])
+    still = breakpoints([(0, 5000, 0, 0, 0)])
+    comes = breakpoints([(0, 0, 0, 0, 0), (10 * SECOND, 10_000, 0, 0, 0)])
+    timelines = following([still, comes])
     for lead, due in [(0, 4), (3, 1), (9, 0)]:
         found = timelines.meetings(np.array([0, 1]), distances(2, lead), 0, 30)
         assert [(0, due, 4, 1), (1, due, 4, 0)] == found
@@ -75,7 +70,7 @@ def test_a_meeting_is_the_same_from_wherever_it_is_looked_for():
     random = np.random.default_rng(3)
     for _ in range(60):
         one, other = (random_track(random, 2000)[0] for _ in range(2))
-        timelines = follow([one, other])
+        timelines = following([one, other])
         steps = [timelines.meeting_on(0, one, distances(1), first, STEPS)[0] for first in range(STEPS)]  # fmt: skip
         for first, step in enumerate(steps):
             assert step == -1 or step >= first
@@ -89,13 +84,13 @@ def test_what_was_found_before_is_not_said_of_other_ways_times_or_distances():
     rows = np.arange(3)
     met = 0
     for _ in range(30):
-        timelines = follow([random_track(random, 2500)[0] for _ in range(3)])
+        timelines = following([random_track(random, 2500)[0] for _ in range(3)])
         kept = distances_of_three(random)
         first = 0
         for _ in range(20):
             if random.random() < 0.3:
                 track = random_track(random, 2500)[0]
-                timelines.follow(int(random.integers(0, 3)), first, track, np.zeros(0, np.int64), np.zeros(1, np.int8))  # fmt: skip
+                timelines.follow(int(random.integers(0, 3)), first, track, *STANDING)
             if random.random() < 0.2:
                 kept = distances_of_three(random)
             end = first + int(random.integers(0, STEPS))

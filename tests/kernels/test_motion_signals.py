@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kernels.scenes import breakpoints, following
 from tests.reference import signals as slow
 
 from fleet2d.kernels import (
-    Breakpoints,
-    Timelines,
     distances_between,
     distances_to_shape,
     sliding_max,
@@ -28,15 +27,12 @@ values = st.lists(value, min_size=1, max_size=14)
 
 
 def timelines_of(tracks):
-    result = Timelines(len(tracks), STEP_US)
-    for body, legs in enumerate(tracks):
-        time = np.cumsum([0, *(leg[0] for leg in legs[1:])]) * STEP_US
-        x, y, away = (np.array(column) for column in list(zip(*legs, strict=True))[1:])
-        points = Breakpoints(
-            time, x.astype(np.int64), y.astype(np.int64), np.zeros_like(time), away.astype(np.uint8)
-        )
-        result.follow(body, 0, points, np.zeros(0, np.int64), np.zeros(1, np.int8))
-    return result
+    rows = []
+    for legs in tracks:
+        times = np.cumsum([0, *(leg[0] for leg in legs[1:])]).tolist()
+        moved = zip(times, legs, strict=True)
+        rows.append([(time * STEP_US, x, y, 0, away) for time, (_, x, y, away) in moved])
+    return following(list(map(breakpoints, rows)), STEP_US)
 
 
 def poses_of(window, body):

@@ -13,11 +13,12 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from tests.kernels.scenes import STANDING, breakpoints, following
 from tests.meshed_homes import home_of
 from tests.reference import motion as slow
 from tests.strategies import quick
 
-from fleet2d.kernels import Breakpoints, Timelines, WalkRule, Window
+from fleet2d.kernels import Timelines, WalkRule, Window
 
 STEP_US = 1000
 HORIZON = 60
@@ -42,12 +43,6 @@ class Twin:
         poses = slow.walk(walls.walls, space.walls, *map(int, rule[:4]), start, step)
         for s, pose in zip(range(step, HORIZON), poses, strict=False):
             self.poses[s] = *pose, 0, 0
-
-
-def breakpoints(track):
-    """Return a track as the kernel has it."""
-    *columns, away = (np.array(column, np.int64) for column in zip(*track, strict=True))
-    return Breakpoints(*columns, away.astype(np.uint8))
 
 
 def runs_of(window, body):
@@ -224,11 +219,7 @@ def test_a_window_of_given_poses_joins_equal_ones(data, bodies, steps, first):
 
 def resting(bodies=1):
     """Return bodies that rest at (5, 6)."""
-    timelines = Timelines(bodies, STEP_US)
-    for body in range(bodies):
-        track = breakpoints([(0, 5, 6, 7, 0)])
-        timelines.follow(body, 0, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
-    return timelines
+    return following([breakpoints([(0, 5, 6, 7, 0)])] * bodies, STEP_US)
 
 
 def test_resting_for_ten_years_is_one_run():
@@ -304,7 +295,7 @@ def test_copies_are_independent():
     timelines = resting()
     twin = copy.deepcopy(timelines)
     track = breakpoints([(0, 50, 60, 70, 1)])
-    twin.follow(0, 4, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
+    twin.follow(0, 4, track, *STANDING)
     assert [(5, 6, 7, 0), (50, 60, 70, 1)] == [timelines.pose(0, 4), twin.pose(0, 4)]
 
 
@@ -320,7 +311,7 @@ def test_forgotten_steps_are_refused(walks):
     timelines, track = walking() if walks else resting(), breakpoints([(0, 5, 6, 7, 0)])
     timelines.pose(0, 30)
     for step in (20,) if walks else (4, 20):
-        timelines.follow(0, step, track, np.zeros(0, np.int64), np.zeros(1, np.int8))
+        timelines.follow(0, step, track, *STANDING)
     timelines.forget(12)
     assert timelines.pose(0, 12)
     for step in (0, 11 if walks else 3):

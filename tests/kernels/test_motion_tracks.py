@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.kernels.scenes import breakpoints
 from tests.meshed_homes import home_of, houseexpo
 from tests.reference import motion as slow
 from tests.reference.line_of_sight import is_inside, touches_any_wall
@@ -16,7 +17,6 @@ from tests.strategies import homes, quick, seeds
 
 from fleet2d.kernels import (
     TURN,
-    Breakpoints,
     Poses,
     WalkRule,
     time_route,
@@ -40,9 +40,8 @@ def rows_of(out):
 
 def traced(track, begin, step, count):
     """Return the poses that the kernel finds."""
-    time, x, y, heading, away = (np.array(column, np.int64) for column in zip(*track, strict=True))
     out = poses(count)
-    trace_track(Breakpoints(time, x, y, heading, away.astype(np.uint8)), begin, step, out)
+    trace_track(breakpoints(track), begin, step, out)
     return rows_of(out)
 
 

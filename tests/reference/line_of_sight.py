@@ -18,8 +18,16 @@ def cross(ax, ay, bx, by):
 
 
 def segments_touch(p, q, a, b):
-    """Return whether the closed segments pq and ab share a point."""
-    return bool(touches_any_wall(np.array([[*a, *b]]), p, np.array([q]))[0])
+    """Return whether the closed segments pq and ab share a point; plain Python integers."""
+    (px, py), (qx, qy), (ax, ay), (bx, by) = p, q, a, b
+    sides = [cross(qx - px, qy - py, x - px, y - py) for x, y in (a, b)]
+    others = [cross(bx - ax, by - ay, x - ax, y - ay) for x, y in (p, q)]
+    if sides[0] * sides[1] > 0 or others[0] * others[1] > 0:
+        return False
+    return all(
+        max(min(c, d), min(e, f)) <= min(max(c, d), max(e, f))
+        for c, d, e, f in ((px, qx, ax, bx), (py, qy, ay, by))
+    )
 
 
 def is_inside(walls, points):
