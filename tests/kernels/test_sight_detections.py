@@ -400,6 +400,14 @@ def test_looks_past_bodies_and_furniture_in_one_room_equal_the_reference(heights
     assert 100 < len(sightings) < len(looked(ROOM, cameras, scene, FIRST).sightings)
 
 
+def test_looks_that_notice_half_of_those_in_view_equal_the_reference():
+    """Somebody who isn't noticed is lost in the first step after the patience, not one later."""
+    home = home_of([shapely.box(0, 0, 1280, 960) - shapely.box(500, 300, 640, 700)])
+    scene = scene_in(home, np.random.default_rng(180), 4, 150, 1.0)
+
+    assert assert_same(home, [slow.Eye(0, 700, half_angle(180), SURE // 2, 2)], scene, 1000)
+
+
 @pytest.mark.parametrize(("per_track", "memory", "patience"), [(True, "0 s", 2), (False, "4 s", 5)])
 def test_looks_in_one_room_of_cameras_that_err_equal_the_reference(per_track, memory, patience):
     """Where users are in view most of the time, so that every way to err happens often."""
