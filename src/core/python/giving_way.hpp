@@ -7,11 +7,11 @@
 namespace fleet2d {
 
 // Row, space, routes or None, speed, turn rate, beat, and a function that leads where the routes don't: see `Yielder`
-// of `fleet2d.kernels`.
+// of `fleet2d.entities.yielder`.
 using YielderFields = std::tuple<i64, Mesh, nb::object, f64, f64, i64, nb::callable>;
 
 // The other body, near, distance, the rooms of places, the parts of the triangles of the space or a function of x and y
-// that returns the part of a point, and the part of the body: see `BodyInWay` of `fleet2d.kernels`.
+// that returns the part of a point, and the part of the body: see `BodyInWay` there.
 using BodyInWayFields = std::tuple<i64, i64, i64, View<const i16, 2>, nb::object, i64>;
 
 // The parts of cells, the part of the body, a function that returns where to begin, how many cells to look nearby and

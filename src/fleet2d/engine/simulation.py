@@ -196,12 +196,11 @@ class Simulation:
         wrong = (f"wrong: {text}" for text in flaws_of(self))
         of_sensors = self._state.find(Sensors)
         sensors = [] if of_sensors is None else of_sensors.notes
-        plan = self.home.plan.notes
         heights = self.scenario.sight.heights
         return [
             *wrong,
             *self._odd_moments(),
-            *plan,
+            *self.home.plan.notes,
             *sources,
             *sensors,
             *unused_settings(self._state.actors, self.home, heights=heights),

@@ -29,8 +29,9 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.giving_way import plan_after, plan_along, plan_around, plan_here, yielder
 from fleet2d.entities.place import is_point
 from fleet2d.entities.plan import Note, Plan
+from fleet2d.entities.yielder import AsideSearch, BodyInWay
 from fleet2d.floorplan.lattice import LatticePoint
-from fleet2d.kernels import I64, SUB, AsideSearch, BodyInWay, Bool, Distances
+from fleet2d.kernels import I64, SUB, Bool, Distances
 from fleet2d.runtime.events import EventKind
 
 EndPlan = Callable[[int, int], None]

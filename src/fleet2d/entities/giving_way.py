@@ -20,6 +20,7 @@ from fleet2d.entities.behavior import Actor, Situation
 from fleet2d.entities.body import Arrangement, Body, Track
 from fleet2d.entities.entity import GivesWay
 from fleet2d.entities.plan import Note, Plan
+from fleet2d.entities.yielder import Continued, Delay, Yielder
 from fleet2d.errors import NoWayError
 from fleet2d.floorplan.costmap import CLOSED, route_by_cost
 from fleet2d.floorplan.lattice import LatticePoint
@@ -30,11 +31,8 @@ from fleet2d.kernels import (
     SUB,
     TURN,
     Breakpoints,
-    Continued,
-    Delay,
     Legs,
     Timelines,
-    Yielder,
     strictly_inside,
     turn_between,
 )
