@@ -1,6 +1,7 @@
 """Bodies in each other's way: they wait, go round, squeeze past; the same for every span."""
 
 import copy
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -119,13 +120,73 @@ def test_what_was_to_come_later_comes_in_time_after_a_rest():
     assert (path(stored, "ana").y[20:] == alone.y[20:]).all()
 
 
+def test_without_it_bodies_are_air():
+    users = {"ana": walker([1, 3], [4, 3], 60.0), "ben": {"start": [3, 3]}}
+    stored = run(home(block={}, users=users))
+
+    assert [] == gives_way(stored)
+    assert gap(stored).min() == 0
+
+
+def test_robots_wait_for_each_other_and_for_people():
+    robots = {
+        "astro": walker([1, 3], [4, 3], 60.0, radius=0.15),
+        "bolt": {"start": [2.5, 3], "start_heading_deg": 0},
+    }
+    stored = assert_same_for_every_max_span(
+        home(robots=robots, users={"ana": {"start": [3.2, 3]}}), 7
+    )
+
+    assert "astro" in {row[1] for row in gives_way(stored)}
+    assert gap(stored, "astro", "bolt").min() >= 0.3
+    assert gap(stored, "bolt", "ana").min() >= 0.35
+    assert gap(stored, "astro", "ana").min() >= 0.35
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("span", some([7, 1, 61], 3))
+@pytest.mark.parametrize("span", some([1, 61], 2))
 def test_spans_do_not_show_where_bodies_block_each_other(span):
-    content = everything("20 min")
+    content = everything("40 min")
     content["simulation"] |= BLOCK
 
     assert digests(run(content)) == digests(run(content, max_span=span))
+
+
+def test_in_a_crowd_bodies_overlap_less_often():
+    users = {name: {"type": "meander", "speed": 0.7} for name in ("ana", "ben", "cleo", "dora")}
+    blocked, free = (run(home("40 min", block, users=users)) for block in (BLOCK, {}))
+    seconds = [
+        sum(int((gap(stored, *pair) < 0.4).sum()) for pair in combinations(users, 2))
+        for stored in (blocked, free)
+    ]
+
+    assert seconds[0] * 5 < seconds[1]
+
+
+def test_a_family_lives_its_day():
+    """Seats, beds, doors and needs: nobody gets stuck, and days go on as they were planned."""
+    member = {
+        "type": "routine",
+        "household": {"members": {"ana": "works_from_home", "ben": "retired", "cleo": "student"}},
+    }
+    content = {
+        "simulation": {"start": "2026-01-05", "duration": "1 d", "seed": 4, **BLOCK},
+        "floorplan": {"type": "bundled", "furnish": True},
+        "users": dict.fromkeys(("ana", "ben", "cleo"), member),
+        "robots": {"astro": {"type": "patrol", "dwell": "1 min"}},
+    }
+    stored = assert_same_for_every_max_span(content, 997)
+    content["simulation"].pop("people_block")
+    free = run(content)
+
+    assert 10 < len(gives_way(stored)) < 2000
+    for name in ("ana", "ben", "cleo"):
+        activities = [
+            rows[(rows["event"] == "activity") & (rows["entity"] == name)]["detail"].tolist()
+            for rows in (stored.pandas("events"), free.pandas("events"))
+        ]
+        same = len(set(activities[0]) & set(activities[1])) / len(set(activities[1]))
+        assert same > 0.8
 
 
 @pytest.mark.parametrize("step", ["250 ms", "2 s"])

@@ -116,6 +116,7 @@ CASES = {
         always(distance(guard, third) >= 0.3)
         eventually(events(deadlock))
         never(during(07:14-07:15) and (speed(butler) > 0.01 or speed(guard) > 0.01))
+        never(during(07:14-07:15) and speed(third) > 0.01)
         """,
     ),
     "a person asleep before the door is waited for, and the stop is skipped": (
@@ -140,6 +141,42 @@ def test_how_robots_yield(name, tmp_path):
     if "floorplan" in sections:
         content["floorplan"] = corridor(tmp_path)
     assert [] == unmet(assert_same_for_every_max_span(content, 61, 1))
+
+
+@pytest.mark.parametrize("people_block", [None, "3 s"])
+def test_two_robots_that_go_to_one_spot_stop_beside_each_other(people_block):
+    robots = {"butler": robot([1, 1], [3, 3], 600.0), "guard": robot([4, 1], [3, 3], 600.0)}
+    content = scenario("5 min", robots=robots, simulation={"people_block": people_block})
+    stored = assert_same_for_every_max_span(content, 61, 1)
+    assert 0 <= nearest(stored, "butler", "guard")
+    assert ends_at(stored, "butler") == (3.0, 3.0)
+    assert np.hypot(*(np.array(ends_at(stored, "guard")) - 3)) < 0.6
+
+
+def test_ghosts_pass_through_each_other():
+    robots = {"butler": robot([1, 3], [4, 3], 60.0), "guard": robot([2.5, 3])}
+    stored = run(scenario("1 min", robots=robots, simulation={"ghosts": True}))
+    assert nearest(stored, "butler", "guard") < 0
+    assert not told(stored, "gives_way", "overlaps")
+
+
+def test_robots_that_are_drawn_begin_apart():
+    robots = {f"r{i}": {"start": "bathroom", "camera": None} for i in range(6)}
+    stored = run(scenario("10 s", robots=robots))
+    assert all(nearest(stored, *pair) >= 0 for pair in combinations(robots, 2))
+
+
+def test_five_robots_queue_at_one_charger():
+    battery = {"driving": "40 min", "standing": "3 h", "charging": "10 min", "charger": [1.0, 3.0]}
+    behaviors = [
+        {"type": "dock", "threshold": "60 %", "until": "80 %"},
+        {"type": "patrol", "dwell": "30 s"},
+    ]
+    one = {"battery": {**battery, "charge": "50 %"}, "camera": None, "behaviors": behaviors}
+    robots = {f"r{i}": {**one, "start": "living_room"} for i in range(5)}
+    stored = assert_same_for_every_max_span(scenario("3 h", robots=robots), 61)
+    assert all(nearest(stored, *pair) >= 0 for pair in combinations(robots, 2))
+    assert {entity for _, _, entity, _ in told(stored, "charged")} == set(robots)
 
 
 def test_a_robot_leaves_in_time_for_a_person_whose_life_stays_the_same():
