@@ -5,12 +5,14 @@ from datetime import UTC, datetime, timedelta
 from io import BytesIO
 
 import pytest
+from tests.change_nights import nights
 from tests.thorough import some
 
 import fleet2d
 from fleet2d import InputError, Simulation
 from fleet2d.engine.repeat import reproduce
 from fleet2d.logs.layout import read_log
+from fleet2d.runs.moments import step_of
 from fleet2d.runtime import local_time
 from fleet2d.runtime.clock import Sun
 from fleet2d.scenario.load import load_scenario
@@ -45,6 +47,16 @@ def test_zone_without_changes_is_a_run_without_zone_but_for_its_stamps(zone):
         frame["time"] = frame["time"].dt.tz_localize(None)
         assert frame.equals(plain.pandas(name)), name
     assert zoned.clock.time(4 * 3600).isoformat()[:19] == "2027-01-01T00:00:00"
+
+
+def test_rules_of_another_year_and_of_a_clock_put_back_over_midnight_run():
+    """In Newfoundland, the second half past eleven belongs to the day before."""
+    night = nights("America/St_Johns", 2010)[1]
+    zone = ["simulation.time_zone=America/St_Johns", f"simulation.start={night.begin.isoformat()}"]
+    overrides = [*zone, "simulation.duration=2 d", "simulation.step=10 s"]
+    run = fleet2d.run("bundled:family", *overrides, seed=4)
+    asleep = [e["time"] for e in run.arrow("events").to_pylist() if e["detail"] == "sleep"]
+    assert len({time.date() for time in asleep}) >= 2
 
 
 def test_run_is_repeated_and_read_by_the_offsets_that_it_stored(tmp_path, monkeypatch):
@@ -110,6 +122,18 @@ def test_exports_have_offsets(tmp_path):
     assert str(run.arrow("events").schema.field("time").type) == "timestamp[us, tz=Europe/Berlin]"
 
 
+def test_stamps_of_ros_are_utc(tmp_path):
+    """Also of a run that begins in the second hour."""
+    pytest.importorskip("rosbags")
+    start = "simulation.start=2026-10-25T02:10+01:00"
+    run = fleet2d.run("bundled:paper", BERLIN, start, "simulation.duration=1 min", seed=4)
+    from fleet2d.live.exporters import Records, Selection
+    from fleet2d.live.exporters.ros import RosMessages
+
+    first = next(iter(RosMessages(Records(run, Selection.of(run)))))
+    assert first.time == 1792890600 * 10**9
+
+
 def sensor(folder, rows, **keys):
     """Return a home in Berlin in the night of 25 hours, with a door that is logged."""
     path = folder / "door.csv"
@@ -149,6 +173,16 @@ def test_door_that_is_open_for_twenty_minutes_in_the_doubled_hour_reads_so(tmp_p
         "2026-10-25T02:50:00+02:00 ON", "2026-10-25T02:10:00+01:00 OFF",
         "2026-10-25T07:00:00+01:00 ON", "2026-10-25T07:05:00+01:00 OFF",
     ]  # fmt: skip
+
+
+def test_reading_of_which_nobody_knows_the_hour_is_told(tmp_path):
+    """It counts as of the first."""
+    rows = LOCAL_ROWS.replace("2026-10-25 02:10,CLOSE\n", "")
+    run = fleet2d.run(sensor(tmp_path, rows))
+    assert run.arrow("sensors")["time"][0].as_py().isoformat() == "2026-10-25T02:50:00+02:00"
+    assert any(
+        "which the clock reads twice, count as of the first" in n for n in run.manifest["notes"]
+    )
 
 
 def test_log_of_another_time_zone_than_the_home_is_refused(tmp_path):
@@ -217,6 +251,35 @@ def test_rows_of_other_tags_and_jitter_begin_no_second_hour(tmp_path, rows, keys
         return
     log = read(tmp_path, "positions", rows, **keys)
     assert [t // 60_000_000 for t in log.time_us.tolist()] == minutes
+
+
+def test_questions_about_a_run_are_in_local_time():
+    """Of an assistant, by DuckDB."""
+    pytest.importorskip("duckdb")
+    from fleet2d.live.questions import answer
+
+    run = fleet2d.run("bundled:family", BERLIN, AUTUMN, "simulation.duration=5 h", seed=4)
+    query = "SELECT step, time FROM key_frames WHERE hour(time) = 2 ORDER BY step"
+    rows = answer(dict(run.tables), query, 500)["shown"]
+    assert rows
+    assert all(str(row["time"]).replace("T", " ").startswith("2026-10-25 02:") for row in rows)
+
+
+def test_beliefs_of_a_run_are_replayed_at_their_moments(tmp_path):
+    """Its own table has instants, which need no time zone."""
+    keys = [BERLIN, AUTUMN, "simulation.duration=5 h", "algorithms.ltp.period=30 min"]
+    first = fleet2d.run("bundled:family", *keys, seed=4, out=tmp_path / "run")
+    again = "algorithms.old={type: replay, path: %s, user: anyone, period: 30 min}"
+    table = tmp_path / "run" / "ltp.parquet"
+    run = fleet2d.run("bundled:family", *keys, again % table, seed=4)
+
+    old = {(row["step"], row["room"]): row["share"] for row in run.arrow("old").to_pylist()}
+    rows = [row for row in first.arrow("ltp").to_pylist() if row["user"] == "anyone"]
+    assert rows
+    assert {row["step"] for row in rows} == {step for step, _ in old}
+    for row in rows:
+        if row["room"] != "away":
+            assert old[row["step"], row["room"]] == pytest.approx(row["share"])
 
 
 @pytest.mark.parametrize(
@@ -311,3 +374,21 @@ def test_what_robots_want_at_a_time_is_once_a_night_and_intervals_are_of_real_ti
         if r["detail"] != "chat ben" or event == "due"
     ]
     assert [text for text in texts if "vitamins" not in text] == expected
+
+
+def test_moments_of_commands_are_local_or_exact():
+    """As `--from` and `--at` take them, in words, in local time, and with an offset."""
+    clock = load_scenario(
+        "bundled:paper", BERLIN, AUTUMN, "simulation.duration=2 d"
+    ).simulation.clock
+    words = {
+        "day 2 02:30": 3.5,
+        "2026-10-25T02:30": 3.5,
+        "2026-10-25T02:30+01:00": 4.5,
+        "2026-10-25T01:30Z": 4.5,
+        "day 2 03:00": 5,
+        "day 3": 26,
+        "26 h": 26,
+    }
+    for text, hours in words.items():
+        assert step_of(text, clock) == hours * 3600, text

@@ -3,6 +3,7 @@
 import copy
 import pickle
 from datetime import UTC, datetime, time, timedelta
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
@@ -58,6 +59,25 @@ def test_clock_reads_as_the_standard_library_each_minute(night):
     utc = [each.astimezone(UTC).replace(tzinfo=None) for each in expected]
     assert clock.stamps(steps).tolist() == utc
     assert [clock.elapsed(moment) for moment in moments] == (steps * clock.step_us).tolist()
+
+
+@pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
+def test_written_time_is_the_first_minute_that_reads_so_or_later_after_a_gap(night):
+    """Each minute of the local night that one may write, by a search through the real ones."""
+    clock = clock_of(night)
+    readings = [night.reading(minute).replace(tzinfo=None) for minute in range(MINUTES)]
+    first = readings[0]
+    latest = max(readings)
+    at = {}
+    for minute, reading in enumerate(readings):
+        at.setdefault(reading, minute)
+    by_reading = sorted(at)
+    for ahead in range((latest - first) // MINUTE + 1):
+        wanted = first + ahead * MINUTE
+        if wanted not in at:  # the next one that is read
+            wanted = next(reading for reading in by_reading if reading > wanted)
+        step = clock.step_at_or_after(clock.elapsed(first + ahead * MINUTE))
+        assert step == at[wanted], first + ahead * MINUTE
 
 
 @pytest.mark.parametrize("night", some(NIGHTS, 2), ids=str)
@@ -175,3 +195,13 @@ def test_zone_is_stored_with_the_offsets_that_were_used():
     }
     again = Zone.of_record(zone.record)
     assert (again.changes_us, again.offsets_us) == (zone.changes_us, zone.offsets_us)
+
+
+def test_new_year_in_the_last_time_zone_comes_at_noon_of_utc():
+    """Days, weeks and years are those of the home."""
+    zone = zone_of("Etc/GMT+12", datetime(2026, 12, 31), datetime(2027, 1, 2))
+    clock = Clock(zone.at(datetime(2026, 12, 31, 23, 59)), 60_000_000, 3)
+    steps = np.arange(3)
+    assert clock.texts(steps)[1] == "2027-01-01T00:00:00-12:00"
+    assert clock.stamps(steps)[1] == np.datetime64("2027-01-01T12:00")
+    assert ZoneInfo("Etc/GMT+12").utcoffset(datetime(2027, 1, 1)) == timedelta(hours=-12)
