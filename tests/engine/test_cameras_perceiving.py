@@ -178,16 +178,31 @@ def test_looks_and_rows_agree():
                 assert looks.detected[camera, user] == rows.sum()
 
 
+def test_a_camera_that_its_offset_puts_into_a_wall_sees_nothing():
+    content = scenario(
+        "1 min",
+        users={"ana": {"start": [1.0, 1.0]}},
+        robots={"r": {"start": [0.3, 1.0], "start_heading_deg": 180, "camera": {"angle_deg": 360}}},
+    )
+    assert table(run(content), "observations")["step"].size
+    content["robots"]["r"]["camera"]["offset"] = [0.4, 0]
+    assert not table(run(content), "observations")["step"].size
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         ({"camera": {}, "cameras": {"a": {}}}, ["robots.r.cameras", "'camera' or 'cameras'"]),
         ({"camera": {"period": "10 s"}}, ["period", "10 s is longer than lost_after"]),
         ({"camera": {"period": "1.5 s"}}, ["robots.r", "not a multiple of simulation.step"]),
+        ({"camera": {"pan": {"headings_deg": []}}}, ["pan.headings_deg"]),
         (
             {"perception": {"detection": {"distance": [[2, 1], [1, 0]]}}},
             ["distance", "must ascend"],
         ),
+        ({"perception": {"detection": {"distance": {"midpoint": 3}}}}, ["distance", "width"]),
+        ({"perception": {"detection": {"distance": 1.2}}}, ["distance", "0 to 1"]),
+        ({"perception": {"detection": {"range": 3}}}, ["unknown key 'range'"]),
         ({"perception": {"detection": {"light": [[-2, 1], [26, 0]]}}}, ["light", "-2", "0 to 24"]),
         (
             {"perception": {"identity": {"confusion": {"ana": {"ana": 1}}}}},
@@ -201,6 +216,7 @@ def test_looks_and_rows_agree():
         ({"perception": {"identity": {"right": 0.9, "mistaken": 0.2}}}, ["0.9", "more than 1"]),
         ({"perception": {"false_positives": {"looks_like": {"zoe": 1}}}}, ["'zoe'", "ana, ben"]),
         ({"perception": {"false_positives": {"per_hour": 4000}}}, ["4000 per hour", "3600"]),
+        ({"perception": {"attributes": {"posture": {"sit": {"sit": 1}}}}}, ["posture.sit"]),
         (
             {"perception": {"attributes": {"activity": {"cook": {"read": 0.6, "eat": 0.6}}}}},
             ["activity.cook", "1.2"],

@@ -2,6 +2,7 @@
 
 import json
 import time
+from datetime import timedelta
 from pathlib import Path
 from typing import ClassVar
 
@@ -11,7 +12,7 @@ from tests.scenes import fleet2d_process, process, scenario
 from tests.thorough import some
 
 import fleet2d
-from fleet2d import Algorithm, Metric
+from fleet2d import Algorithm, Behavior, Metric
 from fleet2d.cli.run import watched
 from fleet2d.configuration.importing import import_class
 from fleet2d.errors import ComponentError, ScenarioError, blame
@@ -133,6 +134,14 @@ def run_prints(folder, how, duration="3 h"):
     override = f"algorithms.own={{type: mine:Prints, how: {how}}}"
     arguments = ("run", f"simulation.duration={duration}", override, "--out", "a")
     return fleet2d_process(*arguments, cwd=folder)
+
+
+@pytest.mark.slow
+def test_an_exit_in_an_update_is_exit_code_1(tmp_path):
+    done = run_prints(tmp_path, "exit")
+    assert 1 == done.returncode
+    assert "algorithms.own failed at step 7199: SystemExit: 0 (mine.py:" in done.stderr
+    assert "failed" == open_run(tmp_path / "a").status
 
 
 @pytest.mark.slow
@@ -264,6 +273,16 @@ def test_a_signal_during_the_code_of_a_component_is_not_its_error(
     assert 130 == process("-c", code, cwd=tmp_path).returncode
 
 
+@pytest.mark.parametrize(
+    "code", some(["raise KeyboardInterrupt", "class B(BaseException): pass\nraise B"], 2)
+)
+def test_no_exception_at_import_ends_the_program(tmp_path, code):
+    (tmp_path / "mine.py").write_text(code)
+    done = fleet2d_process("run", "metrics.odd.type=mine:Odd", cwd=tmp_path)
+    assert 2 == done.returncode
+    assert "can't import 'mine:Odd': mine.py:" in done.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("is_at_import", some([True, False], 2))
 def test_a_run_is_stored_where_it_was_begun(tmp_path, is_at_import):
@@ -311,7 +330,8 @@ class Writes(Metric):
     def update(self, history, state):
         earlier = history.between(history.first, history.end)
         poses = [history.poses("ana"), history.poses("astro"), earlier.poses("ana")]
-        logs = [history.observations, history.truth, history.looks, history.evidence]
+        evidence = history.evidence
+        logs = [history.observations, history.truth, history.looks, evidence, evidence.sightings]
         for given in (*poses, *logs, earlier.observations, history.readings, state.home.plan):
             for key in dir(given):
                 value = None if key.startswith("_") else getattr(given, key)
@@ -328,6 +348,18 @@ def test_arrays_of_the_history_are_read_only():
     metrics = {"writes": {"type": name(Writes), "period": "1 h"}}
     fleet2d.run(small(metrics=metrics), seed=4)
     assert [] == sorted(set(Writes.writable))
+
+
+class Stays(Behavior):
+    """Stays for far too long."""
+
+    def decide(self, now):
+        return now.plan().stay(timedelta.max)
+
+
+def test_a_stay_of_millions_of_years_is_refused():
+    with pytest.raises(ComponentError, match=r"users\.ana.*1000 years"):
+        fleet2d.run(small(users={"ana": {"type": name(Stays)}}), seed=4)
 
 
 @pytest.mark.slow

@@ -59,13 +59,13 @@ def test_a_run_that_was_cut_off_goes_on_from_its_checkpoint(tmp_path, minutes):
 
 def test_a_run_may_be_cut_off_many_times(tmp_path):
     simulation = fleet2d.Simulation(content(), out=tmp_path / "run")
-    for minute in (12, 25, 31):
+    for minute in (12, 25, 31, 44, 58):
         simulation.run_until(60 * minute)
         simulation, remark = reopen(cut_off(simulation))
         assert f"step {600 * (minute // 10)}" in remark
     stored = simulation.run()
     assert undisturbed() == digests(stored)
-    assert [600, 1200, 1800] == stored.manifest["resumed"]
+    assert [600, 1200, 1800, 2400, 3000] == stored.manifest["resumed"]
 
 
 def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path):
@@ -151,7 +151,7 @@ def test_what_can_not_be_gone_on_with_says_why(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["manifest.json.partial", "unfinished", "unfinished/checkpoint.partial"]
+    "name", ["run.lock", "manifest.json.partial", "unfinished", "unfinished/checkpoint.partial"]
 )
 def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path, name):
     """A run directory from elsewhere led to another file, which the lock or the manifest replaced."""
@@ -176,9 +176,12 @@ def test_a_run_with_a_link_in_it_is_not_gone_on_with(tmp_path, name):
     ("key", "value", "words"),
     [
         ("rows", [[0, 1, 2, 3]], r"plan: rows\.0"),
+        ("rows", [], "can't be followed"),
+        ("rows", [[0, -5, 0, 0, 0]], "should be in the home"),
         ("rows", [[0, 12257, 19200, 0, 0]], "should be in the home"),  # above it, but as wide
         ("rows", [[10**9, 12257, 7521, 0, 0]], "the first at 0 us or before"),
         ("rows", [[0, 12257, 7521, 0, 7]], "away must be 0 or 1"),
+        ("walk", [1, 2], "plan: walk"),
         ("notes", [[0, "calls"]], r"plan: notes\.0"),
         ("postures", [[0, 99]], "no posture has the number 99"),
         ("interrupts", ["never"], "no event 'never' interrupts"),
@@ -481,4 +484,6 @@ def test_resume_on_the_command_line(tmp_path):
     assert "continuing from 2026-01-06 00:00:00, step 86400" in done.stderr
     expected = fleet2d.run("bundled:paper", *changes, seed=4).digest
     assert expected == fleet2d.open_run(tmp_path / "run").digest
-    assert 2 == fleet2d_process("resume", "run", cwd=tmp_path).returncode, "it is complete"
+    again = fleet2d_process("resume", "run", cwd=tmp_path)
+    assert 2 == again.returncode
+    assert "complete run" in again.stderr

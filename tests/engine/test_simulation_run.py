@@ -5,7 +5,7 @@ import shutil
 
 import pyarrow.parquet as pq
 import pytest
-from tests.scenes import everything, scenario, write_flat
+from tests.scenes import TESTS, everything, scenario, write_flat
 
 import fleet2d
 from fleet2d.errors import RunDirectoryError
@@ -51,6 +51,30 @@ def test_a_manifest_with_another_seed_is_not_reproduced(stored, tmp_path):
     result = fleet2d.reproduce(copy)
     assert not result.same
     assert {"trajectories", "observations"} <= set(result.differing)
+
+
+def test_fields_of_a_changed_manifest_are_named(stored, tmp_path):
+    """Each key of a field that has keys, and the notes but for those on speed."""
+    copy = shutil.copytree(stored, tmp_path / "copy")
+    manifest = json.loads((copy / "manifest.json").read_text())
+    manifest["steps"] += 1
+    manifest["entities"]["users"].reverse()
+    manifest["metrics"]["mine"] = 3
+    manifest["notes"] += ["ana walks on water"]
+    (copy / "manifest.json").write_text(json.dumps(manifest))
+    result = fleet2d.reproduce(copy)
+    assert not result.same
+    assert {"steps", "entities.users", "metrics.mine", "notes"} <= set(result.differing)
+
+
+def test_a_component_that_is_gone_is_named(tmp_path):
+    module = tmp_path / "mine.py"
+    module.write_text((TESTS / "own_components.py").read_text())
+    content = scenario(algorithms={"share": {"type": f"{tmp_path.as_posix()}/mine:Share"}})
+    fleet2d.run(content, out=tmp_path / "run")
+    module.unlink()
+    with pytest.raises(RunDirectoryError, match=r"mine\.py.*missing"):
+        fleet2d.reproduce(tmp_path / "run", trust=True)
 
 
 def test_a_table_that_was_changed_is_not_reproduced(stored, tmp_path):

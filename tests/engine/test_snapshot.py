@@ -284,6 +284,13 @@ def test_a_module_may_be_imported_in_one_process_and_from_the_folder_in_the_othe
     assert whole.stdout == done.stdout
 
 
+def test_a_file_of_the_same_state_is_the_same_in_any_process(tmp_path):
+    """But for the time that it took until then."""
+    one, other = (open_snapshot(saved(tmp_path / name), PURPOSE) for name in "ab")
+    assert one[0].keys() == other[0].keys()
+    assert one[1].read() == other[1].read()
+
+
 def test_saving_replaces_a_file_and_leaves_nothing_else(tmp_path):
     path = tmp_path / "run.fleet2d"
     path.write_text("old")
@@ -320,13 +327,37 @@ def test_a_place_where_nothing_can_be_written_or_read_is_an_error_in_words(tmp_p
 
 @pytest.mark.parametrize(
     "content",
-    [b"", b"\n", MAGIC[:-1] + b"\n\n\n", pickle.dumps({"a": 1}), bytes(99)],
+    [
+        b"",
+        b"\n",
+        b"hello",
+        b"PK\3\4 a zip",
+        MAGIC[:-1] + b"\n\n\n",
+        pickle.dumps({"a": 1}),
+        bytes(99),
+    ],
 )
 def test_a_foreign_file_is_refused_in_plain_words(tmp_path, content):
     path = tmp_path / "other"
     path.write_bytes(content)
     with pytest.raises(ArtifactError, match="other is not a saved simulation"):
         Simulation.load(path)
+
+
+def test_a_damaged_file_is_refused_wherever_it_is_damaged(tmp_path):
+    path = saved(tmp_path / "run")
+    whole, draws = path.read_bytes(), random.Random(5)
+    cuts = [1, len(MAGIC) + 1, len(MAGIC) + 99, *(draws.randrange(len(whole)) for _ in range(50))]
+    damaged = [whole[:length] for length in cuts]
+    places = (draws.randrange(len(whole)) for _ in range(200))
+    for place in (0, len(MAGIC), len(MAGIC) + 5, *places):
+        content = bytearray(whole)
+        content[place] ^= 1 << draws.randrange(8)
+        damaged.append(bytes(content))
+    for content in (*damaged, whole + b"more"):
+        path.write_bytes(content)
+        with pytest.raises(ArtifactError, match=r"is damaged|is not a saved simulation"):
+            Simulation.load(path)
 
 
 def file_of(body, seal=None, **changes):
@@ -348,7 +379,7 @@ def test_a_file_of_another_version_says_which():
 
 @pytest.mark.parametrize(
     "body",
-    [b"", b"garbage", pickle.dumps(None), pickle.dumps({"a": np.float64})],
+    [b"", b"garbage", pickle.dumps(None), pickle.dumps([1, 2]), pickle.dumps({"a": np.float64})],
 )
 def test_a_file_without_a_state_is_refused_in_plain_words(body):
     with pytest.raises(ArtifactError, match="no state of a run"):

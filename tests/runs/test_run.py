@@ -1,5 +1,6 @@
 """A stored run reads back, or says in plain words why not."""
 
+import json
 import sys
 
 import numpy as np
@@ -90,6 +91,15 @@ def test_verify_sees_a_changed_value_and_not_a_new_layout(directory):
     x[-1] = np.nextafter(x[-1], 2)
     pq.write_table(table.set_column(4, table.schema.field(4), [x]), path)
     assert ["every_kind"] == open_run(directory).verify()
+
+
+def test_verify_sees_a_changed_manifest(directory):
+    path = directory / "manifest.json"
+    content = json.loads(path.read_text())
+    content["digest"] = "0" * 64
+    path.write_text(json.dumps(content))
+
+    assert ["manifest.json"] == open_run(directory).verify()
 
 
 def test_missing_rows_are_noted(directory):

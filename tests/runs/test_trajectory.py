@@ -227,15 +227,16 @@ def test_walk_by_unknown_rules_is_refused_not_guessed():
         run.path("ana")
 
 
+@pytest.mark.parametrize("objects", [{}, {"door": {"type": "door", "doorway": "bathroom_1"}}])
 @pytest.mark.parametrize("at", [(1,), (3600,), (300, 300, 4000)])
-def test_a_person_who_walks_at_random_can_be_put_elsewhere(at):
+def test_a_person_who_walks_at_random_can_be_put_elsewhere(objects, at):
     """Before, the stored run couldn't be rebuilt, and so had no picture."""
     simulation = Simulation(
         {
             "simulation": {"start": "2026-01-05T08:00", "duration": "90 min", "seed": 1},
             "floorplan": "bundled",
             "users": {"ana": "meander", "ben": "meander"},
-            "objects": {"door": {"type": "door", "doorway": "bathroom_1"}},
+            "objects": objects,
             "artifacts": {"trajectories": "every step"},
         }
     )
@@ -263,5 +264,6 @@ def test_times_between_poses_are_durations_or_texts():
 
     apart = run.path("ana", every="10 s")
     assert apart.x.tolist() == run.path("ana", timedelta(seconds=10)).x.tolist()
-    with pytest.raises(ArtifactError, match="expected a duration"):
-        run.path("ana", every="often")
+    for text, message in (("often", "expected a duration"), ("1.5 s", "not a multiple")):
+        with pytest.raises(ArtifactError, match=message):
+            run.path("ana", every=text)

@@ -25,13 +25,21 @@ BASE = {
         (["simulation.duration.days=60"], "simulation", {"duration": {"days": 60}, "seed": 4}),
         (["simulation.seed=5", "simulation.seed=6"], "simulation",
          {"duration": {"days": 30}, "seed": 6}),
+        (["simulation.seed=null"], "simulation", {"duration": {"days": 30}, "seed": None}),
         (["floorplan.type=empty"], "floorplan", {"type": "empty", "cell": 0.1}),
+        (["floorplan=empty"], "floorplan", {"type": "empty", "cell": 0.1}),
+        (["floorplan.type=empty", "floorplan.path=x"], "floorplan",
+         {"type": "empty", "cell": 0.1, "path": "x"}),
         (["floorplan.width=3", "floorplan.type=empty"], "floorplan",
          {"type": "empty", "cell": 0.1, "width": 3}),
         (["users.ana=null"], "users", {"ben": "drift"}),
         (["users=null"], "users", None),
         (["users.ana.type=drift", "users.ben=tour"], "users",
          {"ana": {"type": "drift", "radius": 0.3}, "ben": "tour"}),
+        (["users.ana.behaviors=[drift]"], "users",
+         {"ana": {"radius": 0.3, "behaviors": ["drift"]}, "ben": "drift"}),
+        (["users.cy={type: drift, sigma: 2}"], "users",
+         {**BASE["users"], "cy": {"type": "drift", "sigma": 2}}),
         (["users.ben.sigma=1"], "users", {**BASE["users"], "ben": {"type": "drift", "sigma": 1}}),
         (["robots.astro.type=drift"], "robots", {"astro": {"type": "drift"}}),
         (["robots.astro.behaviors.1.dwell=5 min"], "robots",
@@ -103,6 +111,15 @@ def test_files_extend_files(tmp_path):
     assert ["seed", "step", "start"] == list(data["simulation"])
     assert 2 == data["simulation"]["seed"]
     assert {"ben": "drift"} == data["users"]
+
+
+def test_extended_file_can_change_a_type(tmp_path):
+    write(tmp_path, base="floorplan: {type: houseexpo, path: plan.json, cell: 0.1}")
+    write(tmp_path, home="extends: base.yaml\nfloorplan: {type: empty, width: 3}")
+
+    assert {"type": "empty", "cell": 0.1, "width": 3} == compose(tmp_path / "home.yaml").data[
+        "floorplan"
+    ]
 
 
 def test_class_that_stays_the_same_is_not_imported(tmp_path, monkeypatch):
@@ -200,6 +217,11 @@ def test_name_is_not_inherited(tmp_path):
     assert "name" not in compose(tmp_path / "home.yaml").data
     assert "mine" == compose(tmp_path / "own.yaml").data["name"]
     assert "base" == compose(tmp_path / "base.yaml", ["users.ana.sigma=1"]).data["name"]
+
+
+def test_setting_inside_an_entry_that_is_not_there_is_refused():
+    with pytest.raises(ScenarioError, match=r"there is no robots.asto: did you mean 'astro'"):
+        compose(BASE, (), {("robots", "asto", "speed"): 0.3})
 
 
 @pytest.mark.parametrize(

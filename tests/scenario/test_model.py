@@ -2,7 +2,7 @@
 
 import copy
 import json
-from datetime import datetime, timedelta
+from datetime import date, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -60,6 +60,11 @@ def said(source, *overrides, **settings):
 def test_run_stops_at_the_last_full_step():
     assert 3 == simulation(duration="10 s", step="3 s").steps
     assert 3600 == simulation().steps
+
+
+@pytest.mark.parametrize("start", [date(2026, 1, 5), "2026-01-05", "2026-01-05T00:00"])
+def test_start_is_a_date_or_a_date_and_time(start):
+    assert datetime(2026, 1, 5) == simulation(start=start).start
 
 
 def test_loaded_scenario_is_what_the_file_says(home):

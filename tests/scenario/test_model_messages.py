@@ -47,6 +47,7 @@ class Outer(Settings):
         ({"inner": {"size": "x"}}, "a.yaml:2: inner.size: expected a whole number, got 'x'"),
         ({"inner": {"size": 0}}, "a.yaml:2: inner.size: expected 1 or more, got 0"),
         ({"inner": {"size": 10}}, "a.yaml:2: inner.size: expected 9 or less, got 10"),
+        ({"inner": 3}, "a.yaml:2: inner: expected a mapping of keys, got 3"),
         ({"inner": None}, "a.yaml:2: inner: expected a mapping of keys, got nothing"),
         ({"mode": "of"}, "a.yaml:1: mode: expected 'off' or 'on', got 'of': did you mean 'off'?"),
         ({"flag": "maybe"}, "a.yaml:1: flag: expected true or false, got 'maybe'"),
@@ -56,9 +57,12 @@ class Outer(Settings):
         ({"either": "x"}, "a.yaml:1: either: expected a whole number or a list, got 'x'"),
         ({"days": "week-end"}, "a.yaml:1: days: expected 'daily' or 'weekend' or a list, "
                                "got 'week-end': did you mean 'weekend'?"),
+        ({"filled": ["x"]}, "a.yaml:1: filled.0: expected a whole number, got 'x'"),
+        ({"days": 3}, "a.yaml:1: days: expected 'daily' or 'weekend' or a list, got 3"),
         ({"filled": []}, "a.yaml:1: filled: expected a list of length 1 or more, got []"),
         ({"span": 4.5}, "a.yaml:1: span: expected a list like [0, 4.5], got 4.5"),
         ({"span": [1, 2, 3]}, "a.yaml:1: span: expected a list like [0, 4.5], got [1, 2, 3]"),
+        ({"span": [1]}, "a.yaml:1: span: expected a list like [0, 4.5], got [1]"),
         ({"span": [1, "x"]}, "a.yaml:1: span.1: expected a number, got 'x'"),
         ({"plain": "1 h"}, "a.yaml:1: plain: expected seconds, as the field is a timedelta; a field "
                            "of type Duration reads 5 min, too, got '1 h'"),
