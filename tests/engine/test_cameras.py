@@ -1,13 +1,16 @@
 """Cameras in a run: those that wait for something end a span together, at the earliest of it."""
 
+import copy
 import re
 
 import pytest
 from tests.scenes import OWN, everything, scenario
 
 import fleet2d
+from fleet2d.algorithms.observations import SightingTable
 from fleet2d.engine import loop
-from fleet2d.engine.loop import Span
+from fleet2d.engine.cameras import NOTHING
+from fleet2d.engine.loop import PHASES, Span
 from fleet2d.errors import PlacementError
 
 
@@ -73,6 +76,43 @@ def looks():
         "detection": {"distance": 0.7, "memory": "10 s"},
     }
     return content
+
+
+def observed(cameras):
+    """Return all that cameras carry along and have perceived."""
+    sightings = SightingTable.joined(cameras._sightings or [NOTHING])
+    memory = [array.tolist() for array in cameras.memory]
+    return cameras.next_step, memory, cameras.perceived.tolist(), sightings.rows().tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["line_of_sight", "flashlight"])
+def test_a_span_ends_at_the_earliest_event_and_all_cameras_have_looked_up_to_it(method):
+    """What a camera saw beyond the end of a span is as if it had never looked there."""
+    simulation = fleet2d.Simulation({**looks(), "sight": {"method": {"type": method}}})
+    state, beyond, ended = simulation._state, 0, 0
+    while simulation.step < 600:
+        span = Span(simulation.step, 600)
+        for phase in PHASES[: PHASES.index(loop.watch)]:
+            phase(state, span)
+        ahead, whole = (copy.deepcopy(simulation)._state for _ in range(2))
+        limits, end = [span.end], span.end
+        for watcher in ahead.watchers:
+            if watcher.waits:
+                ahead.take(watcher, span.first)
+                limits.append(watcher.limit(ahead.bodies, end))
+        loop.watch(state, span)
+        assert min(limits) == span.end == state.bodies.step
+        ended += span.end < end
+        beyond += max(limits[1:], default=0) > span.end
+        for cameras, twin in zip(state.cameras, whole.cameras, strict=True):
+            if cameras.waits:
+                whole.take(twin, span.end)
+                assert observed(twin) == observed(cameras)
+        for phase in PHASES[PHASES.index(loop.watch) + 1 :]:
+            phase(state, span)
+    assert ended > 20
+    assert beyond > 5
 
 
 def test_every_draw_of_every_camera_has_a_stream_of_its_own():

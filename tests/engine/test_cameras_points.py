@@ -182,6 +182,16 @@ def test_user_is_interrupted_by_the_sight_of_a_robot_and_spans_do_not_show():
     assert digests(stored) == digests(run(content, max_span=1))
 
 
+def test_users_who_look_change_nothing_else():
+    content = everything("20 min")
+    looking = everything("20 min")
+    looking["users"]["ben"]["camera"] = {"angle_deg": 180}
+    before, after = stored_without_scenario(content), stored_without_scenario(looking)
+
+    assert before.keys() == after.keys()
+    assert ["events"] == [name for name in before if before[name] != after[name]]
+
+
 def test_user_that_errs_is_refused():
     with pytest.raises(InputError, match=r"camera.perception: .*users see robots as they are"):
         fleet2d.load_scenario(facing(perception={"detection": {"distance": 0.5}}))

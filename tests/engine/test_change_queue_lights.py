@@ -39,6 +39,18 @@ def switched(stored, kind):
     return rows["step"].tolist(), rows["detail"].tolist()
 
 
+def test_lights_off_people_in_the_room_are_noticed_a_fifth_as_often():
+    stored = watched(
+        {"at": "22:05", "lights": "kitchen", "turn": "off"},
+        {"at": "22:15", "lights": "kitchen_1", "turn": "on"},
+    )
+    assert seen(stored, "22:00", "22:05") == 300
+    assert 80 < seen(stored, "22:05", "22:15") < 160
+    assert seen(stored, "22:15", "22:20") == 300
+    off, on = ([300], ["kitchen_1"]), ([900], ["kitchen_1"])
+    assert (off, on) == (switched(stored, "light_off"), switched(stored, "light_on"))
+
+
 def unlit(share):
     """A robot that notices so large a share of those who are in the dark."""
     return {"perception": {"detection": {"unlit": share}}}

@@ -68,6 +68,13 @@ def test_spots_that_are_drawn_in_a_room_are_never_where_no_way_leads(tmp_path):
     assert not on_the_rug(stored, "bolt").any()
 
 
+def test_users_walk_where_robots_may_not(tmp_path):
+    user = {"type": f"{HERE}:Hop", "start": [1, 3]}
+    content = flat_with_a_rug(tmp_path, {}, users={"ana": user}, robots={})
+
+    assert on_the_rug(run(content), "ana").any()
+
+
 @pytest.mark.slow
 def test_robot_follows_costs_that_an_algorithm_changes(tmp_path):
     bar = {"bar": {"type": f"{HERE}:Bar", "period": "5 min"}}
@@ -123,6 +130,16 @@ def test_costmap_is_stored_when_the_scenario_asks_for_it(tmp_path):
 def test_place_where_no_way_leads_is_an_error_that_says_so(tmp_path, change, why):
     with pytest.raises(InputError, match=why):
         Simulation(flat_with_a_rug(tmp_path, {}, **change))
+
+
+def test_costmap_that_leaves_no_place_is_an_error(tmp_path):
+    document = flat_document()
+    document["no_go"] = [[[-1, -1], [20, -1], [20, 20], [-1, 20]]]
+    (tmp_path / "all.json").write_text(json.dumps(document))
+    content = flat_with_a_rug(tmp_path, {})
+    content["floorplan"]["path"] = f"{tmp_path}/all.json"
+    with pytest.raises(InputError, match="leave it a place to be"):
+        Simulation(content)
 
 
 class Hop(Behavior):

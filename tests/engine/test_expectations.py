@@ -277,6 +277,7 @@ def test_wrong_expectations_are_refused_with_their_line(text, message, tmp_path)
     [
         ({"always": "moving(ana)"}, "expected two lines, such as `that: always"),
         (["moving(ana)"], "expected an expectation like always"),
+        (3, "expected an expectation like always"),
         (True, "expected an expectation like always"),
     ],
 )

@@ -135,6 +135,21 @@ def test_verdicts_say_how_far_off_they_are_and_are_shown_as_they_were_written():
     assert verdicts["hour"].unit == verdicts["share"].unit == "share"
 
 
+def test_a_window_has_two_ends():
+    begin = "events(find_begins, astro)"
+    texts = [
+        f"after({begin}, moving(astro), within=1..2 min)",
+        f'after({begin}, moving(astro), within="1 min..120 s")',
+    ]
+    one, other = map(parse_expectation, texts)
+
+    assert (
+        str(one)
+        == str(other)
+        == 'after(events("find_begins", "astro"), moving("astro"), within="1 min..2 min")'
+    )
+
+
 def test_a_kind_of_rooms_that_the_home_lacks_is_a_note_not_an_error():
     run, verdicts, *_ = judged()
 
@@ -159,6 +174,8 @@ REFUSED = {
     "never(activity(ben) == sleep)": "there is no activity of ben 'sleep'",
     "never(events(called, astro, detail='find anna'))": "'find anna': did you mean 'find ana'?",
     "never(events(activity, ana, detail=slep))": "did you mean 'sleep'?",
+    "never(events(found, astro, detail=bob))": "'bob'",
+    "never(room(astro) == bathrom)": "did you mean 'bathroom'",
     "never(distance(astro, (400, 2)) < 1)": "(400, 2) m is outside the home, which reaches from (0, 0) to",
     "always(distance(astro, ana) > speed(ana))": "different units: m and m/s",
     "never(room(ana) == activity(ana))": "room and activity are compared, which are never the same",
@@ -232,6 +249,11 @@ def test_python_has_the_same_language():
         (
             "always(distance(astro, ana) > -1)",
             'always holds: distance("astro", "ana") is 0 m or more',
+        ),
+        ("never(speed(astro) < 0)", 'can\'t hold: speed("astro") is 0 m/s or more'),
+        (
+            "at_end(metric(sightings.ana) < 10)",
+            'always holds: metric("sightings.ana") is 0 to 1; write 0.1 for 10 %',
         ),
         (
             "at_end(metric(sightings.ana) > 30)",

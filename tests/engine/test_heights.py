@@ -1,11 +1,17 @@
 """Heights of cameras, bodies and furniture: in runs, for every span and by every exact method."""
 
+import numpy as np
 import pytest
+import shapely
 from tests.engine.test_cameras_hiding import WALK, seen
 from tests.scenes import digests, run, scenario
 from tests.thorough import some
 
 import fleet2d
+from fleet2d.engine.heights import prisms_of
+from fleet2d.floorplan.furniture import stand_furniture
+from fleet2d.floorplan.home import Home
+from fleet2d.kernels import QUARTER
 
 LIES = {"hold": "ana", "posture": "lie", "duration": "1 h", "at": "0 s"}
 ALL = [*range(10)]
@@ -39,6 +45,8 @@ CASES = {
     "who lies behind nothing": (None, {}, ON_THE_FLOOR, True),
     "a head just above the line": (SOFA, {"height": (HIDDEN_BELOW_M + 0.005) * 16 / 15}, {}, True),
     "a head just below it": (SOFA, {"height": (HIDDEN_BELOW_M - 0.005) * 16 / 15}, {}, False),
+    "below a high camera": (SOFA, {"camera_m": 2.5, "x": 4.7, "height": 0.3}, {}, True),
+    "below a lower one": (SOFA, {"camera_m": 1.0, "x": 4.7, "height": 0.3}, {}, False),
     "behind a table on legs": ({"type": "table", "size": [1.2, 0.9]}, {}, {}, True),
     "behind a flat sofa": ({**SOFA, "height": 0}, {}, {}, True),
     "behind a high one": ({**SOFA, "height": 2.0}, {}, {}, False),
@@ -92,6 +100,13 @@ def test_a_child_does_not_hide_an_adult(height_m, expected):
     assert expected == seen(content).get("ana", [])
 
 
+def test_moved_furniture_no_longer_hides():
+    move = {"at": "5 s", "move": "sofa_1", "to": [2.6, 1.0]}
+    content = {**behind({**SOFA, "height": 2.0, "size": [0.6, 0.9]}), "script": [move]}
+
+    assert [5, 6, 7, 8, 9] == seen(content)["ana"]
+
+
 def walkers():
     """People who walk, sit and lie among furniture, and a robot with two cameras."""
     content = behind(SOFA)
@@ -132,3 +147,29 @@ def test_heights_are_the_same_by_every_exact_method_and_change_what_is_seen():
 def test_a_height_of_what_blocks_sight_is_refused():
     with pytest.raises(fleet2d.InputError, match="blocks: path"):
         run(behind({**WARDROBE, "height": 0.9}))
+
+
+def test_the_back_of_a_sofa_is_high_and_its_seat_low():
+    plan = fleet2d.load_floorplan()
+    home = Home(plan)
+    units = plan.lattice.units_per_m
+    for heading in range(0, 4 * QUARTER, 300):
+        sofa = stand_furniture("sofa", (13.0, 3.0), heading, (2.0, 0.9))
+        (seat, seat_m), (back, back_m) = prisms_of(home, sofa)
+        whole, rear = shapely.Polygon(seat), shapely.Polygon(back)
+
+        assert (0.45, 0.85) == (seat_m, back_m)
+        assert abs(rear.area / units**2 - 2.0 * 0.25) < 0.02
+        assert shapely.area(shapely.difference(rear, whole.buffer(2))) == 0
+        ahead = np.array([np.cos(sofa.heading), np.sin(sofa.heading)])
+        middle = shapely.get_coordinates(rear.centroid)[0] / units - np.array([13.0, 3.0])
+        origin = plan.lattice.to_lattice((13.0, 3.0)) / units - np.array([13.0, 3.0])
+        assert abs((middle - origin) @ ahead + 0.325) < 0.02
+
+
+def test_a_height_without_effect_is_a_note():
+    content = behind(SOFA)
+    notes = fleet2d.Simulation({**content, "sight": {}}).notes
+
+    assert any("sight.heights" in note and "robots.astro.camera.height" in note for note in notes)
+    assert not any("sight.heights" in note for note in fleet2d.Simulation(content).notes)

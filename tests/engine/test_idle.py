@@ -52,6 +52,17 @@ def test_behaviors_that_all_get_a_turn_are_not_noted(behaviors):
     assert notes(home(*behaviors)) == []
 
 
+def test_reactions_of_a_person_after_her_days_are_noted():
+    days = {"type": "schedule", "days": AGENDA}
+    users = {"ana": {"behaviors": [days, {"type": "reactions"}]}}
+    simulation = fleet2d.Simulation(home(PATROL) | {"users": users})
+
+    assert [note for note in simulation.notes if note.startswith("users.ana:")] == [
+        "users.ana: reactions never gets a turn, as schedule before always has a plan: put schedule"
+        " last, or give it hours (when) or a cooldown"
+    ]
+
+
 def test_a_behavior_whose_turn_comes_as_the_script_switches_one_off_is_not_noted():
     script = [{"at": "07:02", "switch_off": "astro", "behavior": "patrol"}]
 

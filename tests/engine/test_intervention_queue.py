@@ -3,7 +3,7 @@
 from datetime import datetime, timedelta
 
 import pytest
-from tests.scenes import scenario
+from tests.scenes import everything, scenario
 
 import fleet2d
 from fleet2d.engine.intervention_queue import (
@@ -121,6 +121,19 @@ def test_waiting_for_an_event_changes_nothing_and_ends_at_its_timeout():
     assert run.run_until(event="docks", timeout="5 min") is None
     assert 300 == run.step
     assert run.run().digest == fleet2d.run(home()).digest
+
+
+def test_events_are_those_of_the_table_however_a_run_is_cut():
+    table = fleet2d.run(everything("30 min")).pandas("events")
+    run = fleet2d.Simulation(everything("30 min"))
+    while not run.done:
+        run.advance(97)
+    events = run.events()
+    assert table["step"].tolist() == [event.step for event in events]
+    assert sorted(zip(table["step"], table["event"], strict=True)) == sorted(
+        (event.step, str(event.event)) for event in events
+    )
+    assert [event for event in events if event.step >= 900] == run.events(since=900)
 
 
 def test_interventions_are_read_as_they_are_written():

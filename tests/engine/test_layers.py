@@ -14,6 +14,7 @@ from tests.reference import visible_cells as slow
 from tests.scenes import TESTS, digests, everything, flat_document, path, run, scenario
 from tests.thorough import some
 
+import fleet2d
 from fleet2d import Algorithm, Behavior, Metric
 from fleet2d.engine.simulation import Simulation
 from fleet2d.errors import ArtifactError, Fleet2DError
@@ -226,6 +227,20 @@ def test_a_door_hides_while_it_is_shut_what_is_behind_it(tmp_path):
     last = read_layer(turned, "last_seen.astro")
     assert {120} == set(read_layer(turned, "first_seen.astro")[behind].tolist())
     assert ({239}, {359}) == (set(last[behind].tolist()), set(last[part].tolist()))
+
+
+def test_layers_of_a_stored_run_are_read_back(tmp_path):
+    content = watched("2 min")
+    in_memory = run(content)
+    stored = fleet2d.run(content, out=tmp_path / "run")
+
+    assert in_memory.digest == stored.digest
+    assert set() == set(stored.verify())
+    for name in layer_names(in_memory):
+        expected, result = read_layer(in_memory, name), read_layer(stored, name)
+        assert expected.dtype == result.dtype
+        assert np.array_equal(expected, result, equal_nan=True)
+    assert len(layer_names(stored)) == 8
 
 
 def test_seen_area_at_some_steps_is_that_of_these_steps():

@@ -245,6 +245,27 @@ def told_twice(update, name="a", **more):
     )
 
 
+def test_outputs_become_rows_with_step_and_time():
+    def update(history, state):
+        late = history.end > 60
+        return {"n": history.end, "share": 0.5, "late": late, "word": f"w{history.end}"}
+
+    rows = table(told_twice(update), "a")
+    assert ["step", "time", "n", "share", "late", "word"] == list(rows)
+    assert [59, 119] == rows["step"].tolist()
+    assert ["2026-01-05T07:00:59", "2026-01-05T07:01:59"] == [str(t)[:19] for t in rows["time"]]
+    assert [60, 120] == rows["n"].tolist()
+    assert [False, True] == rows["late"].tolist()
+    assert ["w60", "w120"] == rows["word"].tolist()
+
+
+def test_arrays_become_a_row_per_entry():
+    rows = table(told_twice(lambda h, s: {"x": np.arange(2), "y": ["p", "q"]}), "a")
+    assert [59, 59, 119, 119] == rows["step"].tolist()
+    assert [0, 1, 0, 1] == rows["x"].tolist()
+    assert ["p", "q", "p", "q"] == rows["y"].tolist()
+
+
 def test_nothing_put_out_is_no_row_and_keeps_the_output_before():
     simulation = fleet2d.Simulation(
         watched(

@@ -1,6 +1,7 @@
 """Errors of perception that are components: what they do to the rows and events of a run."""
 
 import copy
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -155,6 +156,20 @@ def test_a_wrong_error_is_named_with_its_step(returns, message):
     assert "robots.astro.perception.errors.odd failed at step" in text
     assert message in text
     assert "own_errors.py" in text or returns in ("nothing", "rows")
+
+
+@pytest.mark.slow
+def test_a_copied_a_saved_and_a_repeated_run_are_the_same(tmp_path):
+    content = unsure(blinking={"type": "Blinking"})
+    whole = run(content, out=tmp_path / "run")
+    assert fleet2d.reproduce(tmp_path / "run", trust=True).same
+    assert "own_errors.py" in {Path(file["path"]).name for file in whole.manifest["inputs"]}
+    simulation = fleet2d.Simulation(content)
+    simulation.run_until("07:08")
+    twin = copy.deepcopy(simulation)
+    simulation.save(tmp_path / "state")
+    loaded = fleet2d.Simulation.load(tmp_path / "state")
+    assert {whole.digest} == {each.run().digest for each in (simulation, twin, loaded)}
 
 
 @pytest.mark.parametrize("robot", ["astro", "curio"])

@@ -205,6 +205,7 @@ def test_a_user_more_leaves_others_and_what_is_detected_of_them_as_they_were(ref
         )
         assert len(before["step"])
         assert before["step"].tolist() == after["step"].tolist()
+        assert before["x"].tolist() == after["x"].tolist()
 
 
 def test_an_algorithm_and_a_metric_more_leave_everything_as_it_was(reference):

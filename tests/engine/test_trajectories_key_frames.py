@@ -1,6 +1,17 @@
 """Key frames: every pose can be rebuilt from them."""
 
-from tests.scenes import run, scenario, table
+from tests.scenes import everything, path, run, scenario, table
+
+
+def test_stored_poses_are_those_rebuilt_from_key_frames():
+    stored = run(everything("1 h"), "artifacts.trajectories=every step")
+    for name in ("ana", "ben", "astro", "bolt", "drift", "ego"):
+        rows, poses = table(stored, "trajectories", entity=name), path(stored, name)
+        here = ~rows["away"]
+        assert rows["away"].tolist() == poses.away.tolist()
+        assert rows["x"][here].tolist() == poses.x[here].tolist()
+        assert rows["y"][here].tolist() == poses.y[here].tolist()
+        assert rows["heading"].tolist() == poses.heading.tolist()
 
 
 def test_key_frames_are_few_and_as_few_whatever_the_step():

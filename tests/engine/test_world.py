@@ -1,5 +1,7 @@
 """Scripts in a run: when each entry is done, and that nothing else changes."""
 
+import copy
+
 import pytest
 from tests.scenes import AGENDA, digests, entries, scenario, table
 
@@ -87,6 +89,29 @@ def test_a_run_with_a_script_and_somebody_outside_is_reproduced(tmp_path):
     assert fleet2d.reproduce(tmp_path / "run").same
 
 
+@pytest.mark.parametrize("way", ["copy", "save", "resume"])
+def test_copies_and_runs_that_go_on_keep_what_a_script_still_waits_for(lively, way, tmp_path):
+    run = fleet2d.Simulation(home(LIVELY), out=tmp_path / "run" if way == "resume" else None)
+    run.advance(500)
+    if way == "copy":
+        done = copy.deepcopy(run).run()
+    elif way == "save":
+        run.save(tmp_path / "state")
+        done = fleet2d.Simulation.load(tmp_path / "state").run()
+    else:
+        run.finish()
+        done = fleet2d.resume(tmp_path / "run")
+    assert lively.digest == done.digest
+    assert lively.manifest["interventions"] == done.manifest["interventions"]
+
+
+def test_an_entry_on_an_event_is_done_once_unless_each_time_is_wanted():
+    script = "on: user_seen, replan: ben\non: user_seen, each: true, replan: ben"
+    done = acts(fleet2d.run(home(entries(script))))
+    assert 1 == sum(by == "script.0" for _, _, by in done)
+    assert 1 < sum(by == "script.1" for _, _, by in done)
+
+
 def test_a_scenario_without_a_script_waits_for_nothing():
     run = fleet2d.Simulation(home([]))
     interventions = run._state.interventions
@@ -115,6 +140,8 @@ def test_a_scenario_without_a_script_waits_for_nothing():
         ("on: user_sen, hold: ana", "did you mean 'user_seen'"),
         ("on: [user_seen, asto], hold: ana", "did you mean 'astro'"),
         ("on: [user_seen, astro, bens], hold: ana", "did you mean 'ben'"),
+        ("on: [found, astro, bob], hold: ana", "'found' with the detail 'bob'"),
+        ("on: [activity, ana, slep], hold: ana", "did you mean 'sleep'"),
         ("on: [docks, astro], hold: ana", "'docks' can never happen to astro"),
         ("on: robot_seen, hold: ana", "'robot_seen' can never happen in this run"),
         ("on: [shut, contact], hold: ana", "can never happen to contact"),

@@ -69,6 +69,15 @@ def test_each_circumstance_changes_its_stage(circumstances, state, stage, sign):
     assert sign * (after[number] - before[number]) > 0.02
 
 
+def test_annoyance_makes_people_refuse():
+    offered = NEAR._replace(interaction=IDLE)
+    assert chances(offered, ANNOYED)[2] < chances(offered, AttitudeState(MORNING))[2] - 0.05
+
+
+def test_a_sleeper_is_never_available():
+    assert chances(NEAR._replace(activity="sleep"))[1] < 0.001
+
+
 def test_a_text_is_not_noticed_by_those_who_look_elsewhere():
     shown = NEAR._replace(interaction=PILL.model_copy(update={"manner": "shown"}))
     assert chances(shown)[0] > 0.9 > 0.4 > chances(shown._replace(from_behind=True))[0]

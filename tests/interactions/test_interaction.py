@@ -63,6 +63,8 @@ def test_the_most_valuable_request_comes_first():
     [
         (Outcome.ACCEPTED, 3, None),
         (Outcome.DECLINED, 3, None),
+        (Outcome.SENT_AWAY, 3, None),
+        (Outcome.BANNED, 3, None),
         (Outcome.SWITCHED_OFF, 3, None),
         (Outcome.DEFERRED, 3, 17 * MINUTE),
         (Outcome.IGNORED, 3, 10 * MINUTE),

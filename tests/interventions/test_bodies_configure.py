@@ -30,6 +30,17 @@ def test_changed_key_changes_what_follows_and_nothing_before():
     assert not same.all()
 
 
+def test_configured_run_is_saved_and_loaded(tmp_path):
+    run = simulation()
+    run.advance(3600)
+    run.do(Configure("astro", "hangout", {"tau": "10 min"}))
+    run.advance()
+    run.save(tmp_path / "saved")
+    loaded = fleet2d.Simulation.load(tmp_path / "saved")
+    assert timedelta(minutes=10) == loaded.actors["astro"].behaviors[1].tau
+    assert loaded.run().digest == run.run().digest
+
+
 def test_another_type_takes_the_place_of_a_behavior_with_its_own_keys_alone(tmp_path):
     run = simulation()
     run.advance(3600)

@@ -4,7 +4,7 @@ import random
 from datetime import timedelta
 
 import pytest
-from tests.scenes import entries
+from tests.scenes import digests, entries
 from tests.thorough import some
 
 import fleet2d
@@ -33,6 +33,20 @@ def test_05_a_room_of_another_type_than_when_it_was_forbidden_is_allowed_again()
     assert [(60, "kitchen_1")] == events(run, "banned")
     assert [(660, "kitchen_1")] == events(run, "allowed")
     assert [] == run.manifest["notes"]
+
+
+def test_a_room_stays_forbidden_while_another_intervention_forbids_it():
+    again = {"at": "2 min", "keep_out": "astro", "of": "kitchen_1", "duration": "20 min"}
+    run = fleet2d.run({**KEPT_OUT, "script": [*KEPT_OUT["script"], again]})
+    assert [(60 * 22, "kitchen_1")] == events(run, "allowed")
+
+
+def test_what_was_forbidden_is_known_after_a_checkpoint(tmp_path):
+    whole = fleet2d.run(KEPT_OUT)
+    simulation = fleet2d.Simulation(KEPT_OUT)
+    simulation.run_until(400)
+    simulation.save(tmp_path / "state")
+    assert digests(whole) == digests(fleet2d.Simulation.load(tmp_path / "state").run())
 
 
 def test_an_activity_that_a_changed_behavior_has_no_longer_is_left():

@@ -4,7 +4,16 @@ import pytest
 from tests.scenes import AGENDA, entries, expecting, scenario, table, unmet
 
 import fleet2d
-from fleet2d.errors import ScenarioError
+from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.interventions import (
+    Away,
+    Dismiss,
+    Fault,
+    HoldStill,
+    Kidnap,
+    Release,
+    SetBattery,
+)
 
 BATTERY = {"driving": "1 h", "standing": "2 h", "charging": "1 h", "charger": [0.5, 6.5]}
 
@@ -48,6 +57,16 @@ CASES = {
         eventually(battery(astro) > 60 %)
         """,
     ),
+    "a robot keeps out of a room until it may enter again": (
+        "at: 10 min, keep_out: astro, of: kitchen, duration: 10 min",
+        {"battery": None},
+        """
+        eventually(room(astro) == kitchen, within=10 min)
+        never(during(07:11-07:20) and room(astro) == kitchen)
+        eventually(during(07:20-07:30) and room(astro) == kitchen)
+        after(events(banned, astro), events(allowed, astro), within=600..601 s)
+        """,
+    ),
     "a robot that is dismissed drops a search": (
         """
         at: 5 min, put: ana, to: storage
@@ -82,6 +101,29 @@ def test_a_robot_that_is_dismissed_drops_whom_it_follows():
     simulation = fleet2d.Simulation(home("at: 380 s, dismiss: astro", behaviors))
     simulation.run_until(381)
     assert not simulation.actors["astro"].behaviors[0].busy()
+
+
+ENTRIES_AND_OBJECTS = {
+    "kidnap: astro, to: bathroom, duration: 2 min": Kidnap("astro", "bathroom", duration="2 min"),
+    "hold: ana, posture: lie, duration: 1 min": HoldStill("ana", posture="lie", duration="1 min"),
+    "fault: astro, charger: true, duration: 5 min": Fault("astro", charger=True, duration="5 min"),
+    "dismiss: astro": Dismiss("astro"),
+    "battery: astro, charge: 50 %": SetBattery("astro", "50 %"),
+    "release: ana": Release("ana"),
+    "away: ana, duration: 2 min": Away("ana", duration="2 min"),
+}
+
+
+def test_objects_do_the_same_as_entries_of_a_script():
+    script = "\n".join(f"at: 5 min, {entry}" for entry in ENTRIES_AND_OBJECTS)
+    simulation = fleet2d.Simulation(home())
+    simulation.run_until("07:05")
+    for intervention in ENTRIES_AND_OBJECTS.values():
+        simulation.do(intervention)
+    tables = [run.manifest["tables"] for run in (fleet2d.run(home(script)), simulation.run())]
+
+    for name in ("trajectories", "observations", "events"):
+        assert tables[0][name] == tables[1][name]
 
 
 @pytest.mark.parametrize(
@@ -123,11 +165,12 @@ def test_when_a_robot_that_lost_its_place_knows_it_again(script, relocalizes, st
         ("at: 5 min, hold: astro, posture: lie", {}, "there is no user 'astro'"),
         ("at: 5 min, fault: astro, charger: true", {"battery": None}, "has no battery"),
         ("at: 5 min, kidnap: astr, to: kitchen", {}, "did you mean 'astro'"),
+        ("at: 5 min, keep_out: astro, of: kitchn", {}, "no room 'kitchn': did you mean 'kitchen'"),
         ("", {"camera": None, "localization": {"relocalizes": "1 s"}}, "it needs a camera"),
     ],
 )
 def test_what_cannot_fail_or_lie_is_refused(script, changes, words):
-    with pytest.raises(ScenarioError, match=words):
+    with pytest.raises((PlacementError, ScenarioError), match=words):
         fleet2d.Simulation(home(script, **changes))
 
 

@@ -66,6 +66,10 @@ CASES = {
         f"{FOR_A_WHILE}, mistake: astro, user: ana, taken_for: ben",
         mistaken,
     ),
+    "somebody is mistaken for nobody known": (
+        f"{FOR_A_WHILE}, mistake: astro, user: ana, taken_for: unknown",
+        lambda row: (row[0], None, *row[2:]) if during(row) and row[1] == "ana" else row,
+    ),
     "two disturbances end one by one": (
         """
         at: 10 min, switch_off: astro, camera: true, duration: 4 min

@@ -34,6 +34,14 @@ def path(run):
     return run.path("astro", timedelta(seconds=0.1))
 
 
+def test_a_command_moves_the_robot_for_its_duration_and_it_stands_then():
+    walked = path(steered({"at": "1 s", "steer": "astro", "forward": 0.2, "duration": "2 s"}))
+
+    along = walked.x - walked.x[0]
+    assert np.allclose(along[[10, 20, 30, 31, 199]], [0, 0.2, 0.4, 0.4, 0.4], atol=1e-3)
+    assert np.ptp(walked.y) < 1e-3
+
+
 def test_a_row_of_short_commands_loses_nothing_to_rounding():
     acts = [{"at": f"{k / 10} s", "steer": "astro", "forward": 0.033} for k in range(100)]
     walked = path(steered(*acts))
@@ -49,6 +57,14 @@ def test_a_turn_on_an_arc_has_the_radius_of_speed_by_rate():
     x, y = walked.x[20] - walked.x[0], walked.y[20] - walked.y[0]
     assert abs(math.hypot(x, y) - 2 * radius) < 5e-3
     assert abs(walked.heading[20] - math.pi) < 0.01
+
+
+def test_a_robot_goes_back_and_turns_clockwise_with_negative_numbers():
+    act = {"at": "0 s", "steer": "astro", "forward": -0.1, "turn_deg": -45, "duration": "1 s"}
+    walked = path(steered(act))
+
+    assert walked.x[10] < walked.x[0]
+    assert abs(walked.heading[10] - (2 * math.pi - math.pi / 4)) < 0.01
 
 
 def test_a_drive_limits_the_command_and_only_a_holonomic_one_goes_sideways():
