@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from tests.pages import PAGES, ROOT
+from tests.pages import PAGES, ROOT, text_of
 from tests.pages import page as page_of
 from typer.testing import CliRunner
 
@@ -174,6 +174,19 @@ def anchors(page: Path):
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     plain = [re.sub(r"[`*]|\]\([^)]*\)|\[", "", heading) for heading in headings]
     return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in plain}
+
+
+def test_who_does_better_than_the_last_sighting_is_as_the_paper_page_says():
+    """Up to a quarter of an hour nobody by more than 0.03, of people simulated or real."""
+    text = text_of("paper")
+    tables = [part.split("\n\n")[0] for part in re.split(r"(?=\| learned \| 0\.9)", text)[1:]]
+    assert 2 == len(tables)
+    for table in tables:
+        rows = {row.split("|")[1].strip(): row.split("|")[2:5] for row in table.splitlines()}
+        naive = [float(cell) for cell in rows.pop("naive")]
+        best = [max(float(row[i]) for row in rows.values()) for i in range(3)]
+        assert best[0] <= naive[0]
+        assert all(0 <= round(best[i] - naive[i], 2) <= 0.03 for i in (1, 2))
 
 
 # They need files of the user, a browser, a minute, or a month.

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from pydantic import TypeAdapter
 from tests.pages import text_of as page
-from tests.scenes import run
+from tests.scenes import run, table
 
 import fleet2d
 from fleet2d import History, Plan, Present, Situation
@@ -184,6 +184,18 @@ def test_the_bundled_month_is_as_the_pages_say():
     assert float(said[1]) == pytest.approx(month.metrics["ltp_error"]["ana"]["tv"], abs=0.0005)
 
 
+def test_people_of_different_households_ignore_each_other():
+    alone = {"ana": {"type": "routine", "persona": "retired"}}
+    both = {**alone, "ben": {"type": "routine", "persona": "student"}}
+    settings = {"simulation": {"duration": "1 d", "seed": 4}, "robots": {}}
+    home = {"floorplan": {"type": "bundled", "furnish": True}}
+    ways = [
+        table(run({**settings, **home, "users": users}), "key_frames", entity="ana")
+        for users in (alone, both)
+    ]
+    assert ways[0]["x"].tolist() == ways[1]["x"].tolist()
+
+
 # Interventions, tests, studies, security
 
 
@@ -230,6 +242,23 @@ def test_rates_that_seeds_can_tell_apart_are_as_the_page_says():
 def test_keys_of_a_study_are_those_of_the_page():
     said = {n for cells in rows(page("studies"), "| key | |") for n in names(cells[0])}
     assert set(StudyFile.model_fields) == said
+
+
+def test_what_the_paper_page_says_of_the_feedback_loop_is_in_its_table():
+    """The error of `likelihood` where all rooms are looked into, and of `audit_only` with rounds."""
+    text = page("paper")
+    errors = {
+        cells[0]: [float(cell.split()[0]) for cell in cells[1:]]
+        for cells in rows(text, "| robot | sighting share |")
+    }
+    likelihood = {robot: line[3] for robot, line in errors.items()}
+    least = likelihood.pop("hangout, 10 % of moves at random")
+    assert "stays at 0.04 to 0.07" in text
+    assert all(0.035 <= error < 0.075 for error in likelihood.values())
+    assert least == pytest.approx(0.29, abs=0.01)
+    clock = errors["hangout, 10 % rounds by the clock"]
+    assert f"is as good ({clock[2]:.3f} and {clock[3]:.3f})" in text
+    assert min(errors["hangout, 10 % of moves at random"]) == least
 
 
 # Homes, expectations

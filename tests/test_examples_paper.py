@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from examples.paper import reproduce as paper
 from examples.paper.reproduce import (
+    ESTIMATORS,
     NAIVE_GUESS,
     SIZES,
     PaperOptions,
@@ -22,7 +23,10 @@ from examples.paper.reproduce import (
 )
 
 from fleet2d.configuration.documents import read_document
+from fleet2d.errors import ComponentError
 from fleet2d.scenario.load import load_scenario
+from fleet2d.studies.design import build_design
+from fleet2d.studies.specification import read_specification
 
 
 def test_the_study_files_hold_the_sizes_of_the_paper():
@@ -42,8 +46,29 @@ def test_months_that_are_there_are_not_run_again(tmp_path):
     assert first.variants["digest"].to_list() == again.variants["digest"].to_list()
 
 
+def test_a_month_that_fails_is_an_error(tmp_path, monkeypatch):
+    (tmp_path / "mine.py").write_text(
+        "from fleet2d import Metric\n"
+        "class Fails(Metric):\n"
+        "    def update(self, history, state):\n        raise ValueError('thirteen')\n"
+    )
+
+    def failing(name, seeds, days):
+        own = {"type": f"{tmp_path.as_posix()}/mine:Fails"}
+        return {**study_content(name, seeds, days), "rules": [{"set": {"metrics.own": own}}]}
+
+    monkeypatch.setattr(paper, "study_content", failing)
+    with pytest.raises(ComponentError, match="thirteen"):
+        run_months(
+            "ltp-gap", PaperOptions(quick=True, seeds=1, days=1, folder=tmp_path / "studies")
+        )
+
+
 PNG = b"\x89PNG\r\n\x1a\n"
 TINY = PaperOptions(quick=True, seeds=1, days=2)
+
+
+HANGOUTS = ("hangout, 10 % of moves at random", "hangout, 10 % rounds by the clock")
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +109,23 @@ def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     assert top_1[NAIVE_GUESS, "0-1 min"] > 0.9
     assert top_1[NAIVE_GUESS, "over 4 h"] < 0.2
     assert top_1["hmm", "over 4 h"] > 0.5
+
+
+def design_of(seeds):
+    return build_design(read_specification(study_content("feedback", seeds, 1)))
+
+
+def test_a_robot_goes_by_the_estimator_of_its_column_only():
+    design = design_of(1)
+    for index in range(len(design)):
+        labels, scenario = design.parameters(index), design.scenario(index).resolved()
+        behaviors = scenario["robots"]["astro"]["behaviors"]
+        sources = [b["source"] for b in behaviors if b["type"] == "hangout"]
+        uses_estimator = labels["robot"] in HANGOUTS
+        assert ([labels["estimator"]] if uses_estimator else []) == sources
+        expected = {labels["estimator"]} if uses_estimator else set(ESTIMATORS)
+        assert expected == set(scenario["algorithms"])
+        assert len(expected) == len(scenario["metrics"])
 
 
 # --- Speed --------------------------------------------------------------------------------------

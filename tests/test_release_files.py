@@ -5,11 +5,15 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 
 import fleet2d
 
 ROOT = Path(__file__).parents[1]
+
+
+FORMS = sorted((ROOT / ".github/ISSUE_TEMPLATE").glob("[!c]*.yml"))
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
     "optional-dependencies"
 ]
@@ -26,6 +30,18 @@ def test_citation_names_the_paper_and_no_version_that_nobody_can_get():
     assert "Fleet2D: A fast and light simulator for Home Robotics" == paper["title"]
     assert paper["title"] in text("README.md")
     assert {"version", "date-released", "doi"}.isdisjoint(citation)
+
+
+@pytest.mark.parametrize("form", [pytest.param(form, id=form.stem) for form in FORMS])
+def test_issue_form_has_what_forms_need(form):
+    content = yaml.safe_load(form.read_text(encoding="utf-8"))
+    assert {"name", "description", "body"} <= set(content)
+    fields = [part for part in content["body"] if part["type"] != "markdown"]
+    assert fields
+    assert all(part["type"] in {"textarea", "input", "dropdown"} for part in fields)
+    ids = [part["id"] for part in fields]
+    assert len(ids) == len(set(ids))
+    assert any(part.get("validations", {}).get("required") for part in fields)
 
 
 def test_container_and_development_container_install_extras_that_there_are():

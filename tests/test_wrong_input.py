@@ -2,7 +2,9 @@
 
 import json
 import os
+import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -61,10 +63,12 @@ def check(result: tuple[int, str, str], code, words, left):
 
 # --- The scenario ------------------------------------------------------------------------------
 
-WRONG = {
+WRONG: dict[str, tuple[dict[str, Any] | str, list[str]]] = {
     "empty": ("", ["home.yaml", "empty"]),
+    "only comments": ("# nothing yet\n", ["home.yaml", "empty"]),
     "no YAML": ("simulation: {duration: [\n", ["home.yaml:2", "not valid YAML"]),
     "a list": ("- simulation\n", ["home.yaml", "list"]),
+    "binary": ("\x00\x01", ["home.yaml"]),
     "no duration": ("floorplan: bundled\nsimulation: {}\n", ["simulation.duration"]),
     "unknown section": (small() | {"user": {}}, ["home.yaml:", "'user'", "did you mean 'users'"]),
     "unknown key": (
@@ -75,17 +79,27 @@ WRONG = {
         changed({"robots": {"astro": {"type": "patrol", "camera": {"angle": 90}}}}),
         ["home.yaml:", "robots.astro.camera", "'angle'", "did you mean 'angle_deg'"],
     ),
+    "unknown key of a behavior": (
+        changed({"robots": {"astro": {"type": "patrol", "dwel": 5}}}),
+        ["robots.astro", "'dwel'", "did you mean 'dwell'"],
+    ),
     "unknown type": (
         changed({"users": {"ana": {"type": "meandr"}}}),
         ["users.ana", "'meandr'", "did you mean 'meander'", "schedule"],
     ),
     "unknown metric": (changed({"metrics": {"sighting": {}}}), ["metrics.sighting", "did you mean 'sightings'"]),
     "wrong type": (changed({"users": {"ana": {"speed": [1, 2]}}}), ["home.yaml:", "users.ana.speed", "speed"]),
+    "wrong type of a section": (changed({"users": ["ana"]}), ["users"]),
     "wrong unit": (
         changed({"users": {"ana": {"speed": "3 kg"}}}),
         ["users.ana.speed", "unknown unit 'kg'", "'3 kg'", "m/s"],
     ),
+    "wrong unit of time": (
+        changed({"simulation": {"duration": "3 months"}}),
+        ["simulation.duration", "unknown unit 'months'", "14 d"],
+    ),
     "negative": (changed({"simulation": {"duration": "-3 d"}}), ["simulation.duration", "0 or more"]),
+    "not a number": (changed({"users": {"ana": {"radius": float("nan")}}}), ["users.ana.radius", "finite"]),
     "too fast": (changed({"users": {"ana": {"speed": 1e300}}}), ["users.ana.speed", "20"]),
     "too slow": (changed({"users": {"ana": {"speed": 1e-300, "type": "meander"}}}), ["users.ana.speed"]),
     "turns too slowly": (changed({"robots": {"r": {"turn_rate_deg": 1e-300}}}), ["robots.r.turn_rate_deg"]),
@@ -96,6 +110,9 @@ WRONG = {
     "a wild walk": (
         changed({"users": {"ana": {"type": "meander", "turn_std_deg": 1e300}}}),
         ["users.ana", "turn_std_deg"],
+    ),
+    "a range the wrong way": (
+        changed({"robots": {"r": {"camera": {"range": [4, 1]}}}}), ["robots.r.camera", "range", "below"]
     ),
     "a seed below 0": (changed({"simulation": {"seed": -1}}), ["simulation.seed"]),
     "two entities of one name": (
@@ -116,8 +133,11 @@ WRONG = {
     ),
     "too wide": (changed({"users": {"ana": {"radius": 2}}}), ["radius", "2 m", "smaller"]),
     "no such plan": (changed({"floorplan": {"path": "nowhere.json"}}), ["floorplan.path", "no such file", "nowhere.json"]),
+    "a plan that is a folder": (changed({"floorplan": {"path": "/"}}), ["floorplan.path", "folder"]),
+    "a cell of nothing": (changed({"floorplan": {"cell": 0}}), ["cell"]),
     "a cell beyond the home": (changed({"floorplan": {"cell": 50}}), ["cell"]),
     "an interval between steps": (changed({"artifacts": {"trajectories": "1.5 s"}}), ["artifacts.trajectories", "multiple"]),
+    "a step longer than the run": (changed({"simulation": {"step": "1 h"}}), ["simulation.duration", "shorter than one step"]),
     "a circle": (
         changed({"algorithms": {"a": {"type": f"{OWN}:Share", "reads": ["b"]}, "b": {"type": f"{OWN}:Share", "reads": ["a"]}}}),
         ["cycle", "a reads b", "b reads a"],
@@ -181,6 +201,15 @@ def test_a_file_that_is_no_home_is_refused(fleet2d, case):
     check(fleet2d("run", *houseexpo, "--out", "out"), 2, ["error:", *words], left)
 
 
+@pytest.mark.parametrize(
+    "case", [name for name in PLANS if name not in ("our own format", "not HouseExpo")]
+)
+def test_what_is_no_home_is_not_drawn(fleet2d, case):
+    text, words = PLANS[case]
+    Path("plan.json").write_text(text)
+    check(fleet2d("show", "plan.json", "--out", "plan.png"), 2, ["error:", *words], {"plan.json"})
+
+
 def test_what_is_not_there_is_not_drawn(fleet2d):
     check(fleet2d("show", "nothing.json"), 2, ["error:", "nothing.json"], set())
     check(fleet2d("show", "famly_home"), 2, ["error:", "did you mean 'family_home'"], set())
@@ -211,6 +240,20 @@ def test_a_run_directory_that_exists_is_left_alone(fleet2d):
         left,
     )
     assert before == {path: path.stat().st_mtime_ns for path in Path("run").iterdir()}
+
+
+def test_a_path_below_a_file_is_refused(fleet2d):
+    scenario_file = written(small())
+    result = fleet2d("run", scenario_file, "--out", "home.yaml/deep/run")
+    check(result, 2, ["error:", "home.yaml", "not a directory", "--out"], {"home.yaml"})
+
+
+@pytest.mark.skipif(os.name != "posix" or os.getuid() == 0, reason="root may write anywhere")
+def test_a_directory_that_can_not_be_written_is_refused(fleet2d):
+    scenario_file = written(small())
+    Path("locked").mkdir(mode=0o555)
+    result = fleet2d("run", scenario_file, "--out", "locked/run")
+    check(result, 2, ["error:", "locked", "may not write", "--out"], {"home.yaml", "locked"})
 
 
 @pytest.mark.skipif(
@@ -250,6 +293,34 @@ def test_a_disk_full_from_the_start_fails_with_exit_1_and_leaves_nothing(fleet2d
     monkeypatch.setattr(store, "write_atomically", full)
     result = fleet2d("run", scenario_file, "--out", "deep/run")
     check(result, 1, ["error:", "disk is full", "--out"], {"home.yaml"})
+
+
+@pytest.fixture
+def tiny_disk(tmp_path):
+    """A disk of 64 kB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)]
+    try:
+        mounted = subprocess.run(command, capture_output=True, check=False).returncode == 0
+    except OSError:
+        mounted = False
+    if not mounted:
+        pytest.skip("no right to mount a small disk")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_real_disk_that_is_full_fails_with_exit_1(fleet2d, tiny_disk):
+    scenario_file = written(small(artifacts={"trajectories": "every step"}))
+    code, _, err = fleet2d(
+        "run", scenario_file, "simulation.duration=3 d", "--out", tiny_disk / "run"
+    )
+    assert 1 == code
+    assert "disk is full" in err
+    assert "Traceback" not in err
+    manifest = tiny_disk / "run" / "manifest.json"
+    assert not manifest.exists() or json.loads(manifest.read_text())["status"] != "complete"
 
 
 # --- Components that fail ----------------------------------------------------------------------
@@ -343,6 +414,16 @@ def test_a_metric_that_fails_leaves_what_was_stored_before(fleet2d):
     assert [] == run.verify()
 
 
+def test_a_module_that_fails_to_import_is_named(fleet2d):
+    Path("mine.py").write_text("raise RuntimeError('half written')")
+    scenario_file = written(small(users={"ana": {"type": "mine:Walk"}}))
+    code, _, err = fleet2d("run", scenario_file, "--out", "run")
+    assert 2 == code
+    for word in ("users.ana", "mine:Walk", "RuntimeError", "half written"):
+        assert word in err
+    assert not Path("run").exists()
+
+
 def test_a_module_that_fails_to_import_is_told_once(fleet2d):
     Path("mine.py").write_text("x = 1\ny = z\n")
     users = {"ana": {"type": "mine:Walk"}, "bob": "mine:Sit"}
@@ -364,6 +445,7 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d):
         (["run", "home.yaml", "simulation.duration"], ["'simulation.duration'", "no '='", "key.path=value"]),
         (["run", "home.yaml", "simulation.duration="], ["'simulation.duration='", "no value"]),
         (["run", "home.yaml", "simulation..x=1"], ["key is empty"]),
+        (["run", "home.yaml", "simulation.durations=1 h"], ["durations", "did you mean 'duration'"]),
         (["run", "home.yaml", "users.ana.speed=fast"], ["users.ana.speed=fast", "expected a speed"]),
         (["validate", "home.yaml", "simulation.duration=7"], ["7 has no unit: write '7 d', '7 h', '7 min' or '7 s'"]),
         (["validate", "home.yaml", "robots.astro.behaviors[0].dwell=1 h"], ["write robots.astro.behaviors.0.dwell=1 h"]),
@@ -378,13 +460,17 @@ def test_a_module_that_fails_to_import_is_told_once(fleet2d):
         (["validate", "home.yaml", "expect={a: always(speed(astro) => 1 && moving(astro))}"], ["write always(speed(astro) >= 1 and moving(astro))"]),
         (["validate", "home.yaml", "robots.astro.camera.range=0.3,4.5"], ["expected a list like [0"]),
         (["validate", "home.yaml", "robots.asto.speed=0.3"], ["there is no robots.asto", "did you mean 'astro'"]),
+        (["validate", "home.yaml", "robots.astro.camera.range=4.5"], ["expected a list like [0"]),
         (["validate", "floorplan=nope.json"], ["override 'floorplan=nope.json': floorplan.type", "to read a file write {type: TYPE, path: nope.json} with one of ", "houseexpo", "valetudo"]),
         (["validate", "floorplan.path=he.json"], ["unknown key 'path'", "is a key of", "houseexpo", "give floorplan.type, too"]),
         (["validate", "bundled:rounds", "robots.astro.dwell=5 min"], ["unknown key 'dwell'", "robots.astro.behaviors.0.dwell"]),
         (["run", "home.yaml", "users.bob=null"], ["users.bob", "none of this name", "ana"]),
         (["run", "home.yaml", "robots.astro.behaviors.3.dwell=5 s"], ["behaviors.3"]),
         (["run", "home.yaml", "other.yaml"], ["'other.yaml'", "no '='"]),
+        (["run", "home.yaml", "--fast"], ["--fast"]),
+        (["rum"], ["rum"]),
         (["verify", "home.yaml", "--again"], ["home.yaml", "file"]),
+        (["verify", "nothing", "--again"], ["nothing", "does not exist"]),
         (["verify"], ["RUN_DIR"]),
         (["convert", "nothing.yaml", "new.yaml"], ["nothing.yaml"]),
     ],

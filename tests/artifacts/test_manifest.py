@@ -53,7 +53,9 @@ def test_manifest_is_sorted_and_strict_json(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("", "is damaged"),
         ('{"format": 1, "status": "comp', "is damaged"),
+        ("[]", "has no key 'format'"),
         ("{}", "has no key 'format'"),
         ('{"format": 1, "status": "complete"}', "lacks digest"),
         ('{"format": 99}', "written by a later Fleet2D"),

@@ -3,6 +3,8 @@
 import errno
 import os
 import subprocess
+import sys
+import time
 from datetime import timedelta
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from pydantic import ValidationError
+from tests.thorough import some
 
 from fleet2d.artifacts import arrow
 from fleet2d.artifacts.manifest import Manifest
@@ -107,6 +110,14 @@ def test_empty_tables_and_no_rows(tmp_path):
     assert [0, 0] == [run.arrow(name).num_rows for name in ("poses", "every_kind")]
     assert [] == run.verify()
     assert digests == opened(None, POSES, EVERY_KIND).close()
+
+
+def test_run_without_tables(tmp_path):
+    store = RunStore(tmp_path / "run")
+    store.open()
+    store.close()
+
+    assert [] == list(open_run(tmp_path / "run").tables)
 
 
 def test_table_may_be_added_later_and_again(tmp_path):
@@ -328,6 +339,68 @@ def test_close_again_gives_the_same(tmp_path):
     assert digests == store.close()
     assert digests == store.close()
     assert {"save": 0.25} == open_run(tmp_path / "run").manifest["wall_s"]
+
+
+CRASH = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from tests_of_artifacts import EVERY_KIND, rows_of_every_kind
+from fleet2d.artifacts.store import RunStore
+from fleet2d.artifacts.table import TableSpec
+
+specs = [TableSpec(f"t{k}", EVERY_KIND.columns) for k in range(20)]
+store = RunStore(Path(sys.argv[1]), specs, flush_rows=200)
+store.open()
+rows = rows_of_every_kind(500)
+print("ready", flush=True)
+for round in range(3):
+    for spec in specs:
+        store.append(spec.name, **rows)
+    print("storing", flush=True)
+    if sys.argv[3] == "storing":
+        sys.stdin.read()
+print("closing", flush=True)
+store.close()
+print("closed", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="kill -9 is a matter of POSIX")
+def test_crash_never_leaves_a_file_that_looks_whole(tmp_path):
+    """Killed in the middle of storing, of closing, and just after.
+
+    The child waits for its end in the first case and in the last, whatever the machine is doing;
+    the others die somewhere between.
+    """
+    helper = (Path(__file__).parent / "tables.py").read_text(encoding="utf-8")
+    (tmp_path / "tests_of_artifacts.py").write_text(helper, encoding="utf-8")
+    seen = set()
+    for k, (word, delay) in enumerate(
+        some([("storing", 0), ("ready", 0.02), ("closing", 0), ("closing", 0.01), ("closed", 0)], 2)
+    ):
+        directory = tmp_path / f"run{k}"
+        command = [sys.executable, "-c", CRASH, str(directory), str(tmp_path), word]
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as child:
+            while child.stdout.readline().strip() != word:
+                assert child.poll() is None, "the child failed"
+            time.sleep(delay)
+            child.kill()
+
+        run = open_run(directory)
+        seen.add(run.status)
+        for path in directory.glob("*.parquet"):
+            assert 1500 == pq.read_table(path).num_rows
+        if run.status == "running":
+            assert any("crashed" in note for note in run.notes)
+            assert all(1500 == run.arrow(name).num_rows for name in run.tables)
+        else:
+            assert ("complete", []) == (run.status, run.verify())
+    assert {"running", "complete"} == seen
 
 
 def test_arrow_mid_run_shows_all_rows_and_keeps_the_digest():

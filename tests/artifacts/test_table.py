@@ -34,6 +34,12 @@ def test_column_refuses_a_category_named_twice():
         Column("x", "category", categories=("a", "a"))
 
 
+@pytest.mark.parametrize("name", ["", "../up", "a/b", ".hidden"])
+def test_table_refuses_a_name_that_is_no_file_name(name):
+    with pytest.raises(ArtifactError, match="can't be named"):
+        TableSpec(name, (Column("step", "step"),))
+
+
 @pytest.mark.parametrize("columns", [(), (Column("a", "int32"), Column("a", "bool"))])
 def test_table_refuses_no_columns_and_double_ones(columns):
     with pytest.raises(ArtifactError, match=r"no columns|twice"):

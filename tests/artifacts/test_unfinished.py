@@ -259,6 +259,12 @@ def test_two_tables_of_one_name_are_refused(tmp_path):
         open_run(directory).arrow("late")
 
 
+def test_what_is_no_journal_has_no_commit(tmp_path):
+    assert last_commit(tmp_path / "nothing") is None
+    (tmp_path / "text").write_text("hello")
+    assert last_commit(tmp_path / "text") is None
+
+
 def test_one_run_has_one_writer(tmp_path):
     store = begin_run(tmp_path / "run")
     with pytest.raises(RunDirectoryError, match=f"being written by process {os.getpid()} on"):

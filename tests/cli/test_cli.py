@@ -293,6 +293,33 @@ def test_show_draws_a_run_in_its_home(fleet2d):
     assert [] == package.open_run("run").verify()
 
 
+def without_matplotlib(folder, *arguments):
+    (folder / "matplotlib.py").write_text("raise ImportError('No module named matplotlib')")
+    script = "import sys; sys.path.insert(0, sys.argv.pop(1)); from fleet2d.cli import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", script, str(folder), *arguments],
+        capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), *sys.path])},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("command", [["show"], ["show", "--checkup"]])
+def test_picture_without_matplotlib_says_what_to_install(tmp_path, command):
+    done = without_matplotlib(tmp_path, *command, "--out", str(tmp_path / "x.png"))
+
+    assert done.returncode in (1, 2), done.stderr
+    assert "Traceback" not in done.stderr
+    for word in ("matplotlib", "fleet2d[viz]"):
+        assert word in done.stderr
+
+
+def test_validate_checks_a_floor_plan_without_matplotlib(tmp_path):
+    done = without_matplotlib(tmp_path, "validate", "family_home")
+
+    assert 0 == done.returncode, done.stderr
+    assert "ok: nothing wrong" in done.stdout
+
+
 # --- reproduce ---------------------------------------------------------------------------------
 
 

@@ -70,6 +70,16 @@ def test_no_description_of_a_command_is_cut_or_wrapped(words, fleet2d, monkeypat
             assert len(description) <= 58, name
 
 
+def test_descriptions_are_wrapped_in_a_narrow_terminal(fleet2d, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "50")
+    _, out, _ = fleet2d("--help")
+
+    commands = out.partition("Run:")[2].partition("Examples:")[0]
+    assert max(map(len, commands.splitlines())) <= 50
+    assert "..." not in commands
+    assert "Simulate a scenario and store the run." in " ".join(commands.split())
+
+
 @pytest.mark.parametrize("words", list(all_commands()), ids=" ".join)
 def test_help_of_each_command_ends_in_examples_that_are_valid(words, fleet2d):
     code, out, err = fleet2d(*words, "--help")
@@ -151,6 +161,13 @@ def test_no_number_of_the_table_is_cut_in_a_narrow_terminal(fleet2d, monkeypatch
         tables.append([line for line in lines if line[:1] != ["stored"] and " x " not in str(line)])
     narrow, wide = ([line for line in table if "real" not in line] for table in tables)
     assert narrow == wide
+
+
+def test_no_unit_of_the_table_is_cut_in_a_narrow_terminal(fleet2d, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    _, out, _ = fleet2d("run", "bundled:paper", "simulation.duration=1 d", "--out", "run")
+
+    assert "share of time at home" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(

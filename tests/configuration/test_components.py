@@ -1,6 +1,7 @@
 """Components: frozen configuration beside free run state, and finding classes by name."""
 
 import copy
+import pickle
 import subprocess
 import sys
 from importlib.metadata import EntryPoint, EntryPoints
@@ -195,6 +196,12 @@ def test_own_component_is_found_again_by_the_name_it_dumps(folders):
 
     assert f"{folders[1]}/parts.own:Own" == cls.type_name
     assert cls is lookup("gadget", cls.type_name)
+
+
+def test_own_component_copies_and_pickles(folders):
+    own = lookup("gadget", Text("own:Own", folders[1]))()
+
+    assert own == copy.deepcopy(own) == pickle.loads(pickle.dumps(own))
 
 
 def test_module_that_is_imported_already_is_not_loaded_twice(folders, monkeypatch):

@@ -59,6 +59,18 @@ def test_gymnasium_has_no_complaint(task):
     check_env(env, skip_render_check=True)
 
 
+@pytest.mark.parametrize("task", TASKS)
+def test_actions_are_sampled_by_the_mask(task):
+    env = RobotEnv(short(task), masked="error")
+    _, info = env.reset(seed=1)
+
+    assert np.int8 == info["action_mask"].dtype
+    for _ in range(20):
+        _, _, _, is_over, info = env.step(env.action_space.sample(info["action_mask"]))
+        if is_over:
+            break
+
+
 @pytest.mark.filterwarnings("ignore:Your observation")  # a table, for which it has no network
 def test_stable_baselines_has_no_complaint():
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="not installed")
@@ -79,6 +91,17 @@ def test_pettingzoo_has_no_complaint():
 
     parallel_api_test(RobotsEnv({"scenario": two_robots()}), num_cycles=60)
     parallel_seed_test(lambda: RobotsEnv({"scenario": two_robots()}), num_cycles=20)
+
+
+def test_robots_sample_their_actions_by_their_masks():
+    env = RobotsEnv({"scenario": two_robots()}, masked="error")
+    _, infos = env.reset(seed=1)
+    for _ in range(10):
+        masks = {robot: infos[robot]["action_mask"] for robot in env.agents}
+        actions = {robot: env.action_space(robot).sample(mask) for robot, mask in masks.items()}
+        *_, infos = env.step(actions)
+
+    assert {np.dtype(np.int8)} == {info["action_mask"].dtype for info in infos.values()}
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -145,6 +168,15 @@ def test_reward_may_be_a_function():
 def test_wrong_values_of_what_varies_are_an_error_that_says_which(vary, message):
     with pytest.raises(InputError, match=message):
         RobotEnv({"scenario": load_task("hangout").scenario, "vary": vary})
+
+
+def test_values_may_be_whole_sections_of_the_scenario():
+    users = [{"ana": {"type": "routine", "persona": name}} for name in ("student", "retired")]
+    env = RobotEnv({"scenario": flat(), "vary": {"users": {"train": users}}})
+
+    env.reset(seed=1)
+
+    assert set(env.present.simulation.scenario.users) == {"ana"}
 
 
 def test_unknown_option_of_a_reset_is_an_error_and_keeps_the_life():

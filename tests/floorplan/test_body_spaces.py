@@ -139,9 +139,10 @@ def test_home_is_whole_unless_furniture_divides_it_or_a_wall_is_slanted():
     across = lattice_footprint(plan, bed)
     slanted = FloorPlan.build("tent", shapely.Polygon([(0, 0), (5, 0), (5, 4)]))
 
-    assert cuts_nothing(plan, [], boxes_of([]), BODY_RADIUS)
-    assert not cuts_nothing(plan, [], boxes_of([across]), BODY_RADIUS)
-    assert cuts_nothing(plan, [across], boxes_of([across]), BODY_RADIUS)
+    for radius in RADII:
+        assert cuts_nothing(plan, [], boxes_of([]), radius)
+        assert not cuts_nothing(plan, [], boxes_of([across]), radius)
+        assert cuts_nothing(plan, [across], boxes_of([across]), radius)
     assert stays_whole(plan, [], RADII)
     assert not stays_whole(plan, [across], RADII)
     assert not stays_whole(slanted, [], RADII)

@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import numpy as np
 import pytest
 import shapely
 from hypothesis import given
@@ -23,6 +24,11 @@ from fleet2d.floorplan.space import BODY_RADIUS, Space
 
 # Cells of less than this may become a pocket beside furniture: no body's length fits into it.
 POCKET_M2 = 0.1
+
+
+def of_type(plan, kind):
+    """Return the objects of a type."""
+    return [thing for thing in plan.objects if thing.type == kind]
 
 
 def check_stands_free(empty, plan):
@@ -74,17 +80,16 @@ def check_all(empty, plan):
 
 @pytest.mark.slow
 def test_real_homes_and_maps_of_robots_are_furnished_without_harm(shared_data):
-    paths = plan_files(shared_data)
-    paths += some(
-        [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")], 3
-    )
+    homes = plan_files(shared_data)
+    maps = [*shared_data.glob("ros_maps/*/map.yaml"), *shared_data.glob("valetudo/*.json")]
+    assert 6 == len(maps)
     pieces = 0
-    for path in paths:
+    for path in [*homes, *some(maps, 3)]:
         empty = load_floorplan(path)
         plan = furnish(empty)
         check_all(empty, plan)
-        pieces += len(plan.objects)
-    assert pieces > 12 * len(paths)
+        pieces += len(plan.objects) * (path in homes)
+    assert pieces > 14 * len(homes)
 
 
 @pytest.mark.slow
@@ -134,6 +139,24 @@ def test_room_gets_what_its_type_needs(kind, expected):
     assert furnish(plan, 3) == furnish(plan, 3)
 
 
+def test_kitchen_stands_along_one_wall():
+    plan = furnish(one_room("kitchen"))
+    line = [of_type(plan, kind)[0] for kind in ("stove", "sink", "fridge")]
+
+    assert 1 == len({thing.heading for thing in line})
+
+
+def test_bed_has_its_head_at_a_wall_and_the_tv_faces_the_sofa():
+    (bed,) = of_type(furnish(one_room("bedroom")), "bed")
+    back = np.array(bed.footprint.centroid.coords[0]) - 1.0 * np.array(
+        [np.cos(bed.heading), np.sin(bed.heading)]
+    )
+    assert min(back[0], 5 - back[0], back[1], 4 - back[1]) < 0.2
+    plan = furnish(one_room("living_room"))
+    sofa, tv = of_type(plan, "sofa")[0], of_type(plan, "tv")[0]
+    assert pytest.approx(np.pi) == abs(sofa.heading - tv.heading)
+
+
 def test_rooms_of_no_known_type_get_nothing():
     assert () == furnish(one_room("unknown")).objects
     assert () == furnish(one_room("yoga_studio")).objects
@@ -176,6 +199,16 @@ def test_nothing_stands_before_a_doorway():
         assert len(furnished.objects) >= 5
         covered = shapely.union_all([thing.footprint for thing in furnished.objects])
         assert shapely.intersection(before, covered).area < 1e-9
+
+
+def test_charger_stands_once_in_the_hallway():
+    plan = furnish(load_floorplan())
+    chargers = of_type(plan, "charger")
+
+    assert 1 == len(chargers)
+    at = chargers[0].footprint.centroid
+    room = plan.room_at(at.x, at.y)
+    assert "hallway" == room.type
 
 
 def test_home_that_nobody_fits_into_is_refused():

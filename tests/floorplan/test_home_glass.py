@@ -1,5 +1,7 @@
 """Glass is seen through and not walked through; outer windows show nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 from hypothesis import given, settings
@@ -7,7 +9,9 @@ from hypothesis import strategies as st
 from tests.reference.line_of_sight import visible
 from tests.thorough import examples
 
+import fleet2d
 from fleet2d.floorplan.home import Home
+from fleet2d.floorplan.load import load_floorplan, save_floorplan
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
@@ -22,6 +26,13 @@ WITHOUT_DOOR = shapely.MultiPolygon([LEFT, RIGHT])
 def office(free=FREE, **parts):
     doors = [DoorLine((4.05, 4), (4.05, 4.9))] if free is FREE else None
     return FloorPlan.build("office", free, **{"glass": [PANE], "doorways": doors, **parts})
+
+
+def stored(plan, folder):
+    """Return the floor plan of a scenario that reads a plan."""
+    path = folder / f"{plan.digest[:8]}.json"
+    save_floorplan(plan, path)
+    return {"type": "native", "path": str(path)}
 
 
 def walls_of(shape):
@@ -54,6 +65,17 @@ def test_views_through_glass_are_those_of_the_slow_reference(seed):
     assert visible(walls_of(snapped), eye, np.array(points)).tolist() == seen.tolist()
 
 
+def test_robot_sees_through_glass_and_drives_round_it():
+    home = Home(office())
+    space, point_at = home.space(0.15), home.plan.lattice.point_at
+    route = space.route(point_at((3.0, 2.0)), point_at((5.0, 2.0)))
+
+    assert sees(home, (1, 2), (7, 2))
+    assert not sees(home, (1, 0.5), (7, 0.5))
+    assert route[:, 1].max() > point_at((0, 4))[1]
+    assert [] == list(home.plan.notes)
+
+
 def test_bodies_on_the_border_of_their_space_get_inside_on_their_side_of_the_glass():
     home = Home(office(WITHOUT_DOOR))
     (x, y), beyond = (home.plan.lattice.point_at(at) for at in ((3.9, 2), (4.3, 2)))
@@ -61,6 +83,29 @@ def test_bodies_on_the_border_of_their_space_get_inside_on_their_side_of_the_gla
     assert sees(home, (3.9, 2), (4.3, 2))
     assert not line_of_sight(home.barriers, x, y, locate(home.barriers, x, y), *beyond)
     assert home.space(0.15).walls is home.barriers
+
+
+def test_person_behind_glass_is_observed_and_behind_a_wall_is_not(tmp_path):
+    def sightings(plan):
+        run = fleet2d.run(
+            {
+                "floorplan": stored(plan, tmp_path),
+                "simulation": {"duration": {"minutes": 5}, "seed": 1},
+                "users": {"u": {"start": [5.5, 2], "type": "live"}},
+                "robots": {
+                    "r": {
+                        "start": [2, 2],
+                        "start_heading_deg": 0,
+                        "behaviors": [],
+                        "camera": {},
+                    }
+                },
+            }
+        )
+        return len(run.polars("observations"))
+
+    assert sightings(office(WITHOUT_DOOR)) > 200
+    assert 0 == sightings(office(WITHOUT_DOOR, glass=[]))
 
 
 def test_tall_furniture_and_shut_doors_hide_what_is_behind_them():
@@ -83,3 +128,14 @@ def test_outer_windows_and_glass_off_walls_are_noted_and_change_nothing():
     assert Home(plan).barriers is Home(plan).walls
     assert any("the glass at (1.10, 1.50) m is in no wall" in note for note in plan.notes)
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
+
+
+def test_glass_is_stored_read_and_part_of_the_content(tmp_path):
+    plan = office()
+    save_floorplan(plan, tmp_path / "own.json")
+    save_floorplan(plan, tmp_path / "plan.geojson")
+
+    assert plan == load_floorplan(tmp_path / "own.json")
+    assert replace(plan, glass=()).digest != plan.digest
+    again = load_floorplan(tmp_path / "plan.geojson")
+    assert shapely.union_all(again.glass).contains(shapely.union_all(plan.glass).buffer(-2))

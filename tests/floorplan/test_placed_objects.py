@@ -8,18 +8,29 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import Lattice
 from fleet2d.floorplan.placed_objects import (
     PlacedObject,
     UsePlace,
     describe_object,
     move_object,
+    number_objects,
 )
 
 LATTICE = Lattice(0.05, (0.0, 0.0), 200, 200)
 SOFA = PlacedObject(
     "sofa", "sofa", shapely.box(2, 2, 4, 3), uses=(UsePlace(3, 2.5, math.pi / 2, "sit"),)
 )
+
+
+def thing(name):
+    return PlacedObject(name, "chair", shapely.box(0, 0, 0.5, 0.5))
+
+
+def test_two_objects_of_one_name_are_refused():
+    with pytest.raises(FloorPlanError, match="two objects are named 'a'"):
+        number_objects([thing("a"), thing("a")])
 
 
 @given(st.floats(-360, 360), st.floats(1, 9), st.floats(1, 9))

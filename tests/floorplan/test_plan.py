@@ -65,6 +65,12 @@ def test_copies_are_the_plan_itself_and_pickles_equal_it(flat):
     assert flat == pickle.loads(pickle.dumps(flat))
 
 
+def test_arrays_of_a_plan_cannot_be_written(flat):
+    for array in (flat.free, flat.room_of_cell):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 1
+
+
 def test_holes_and_separate_parts_are_kept_and_noted():
     house = shapely.difference(shapely.box(0, 0, 6, 6), shapely.box(2, 2, 4, 4))
     plan = FloorPlan.build("estate", shapely.union(house, shapely.box(10, 0, 12, 2)))

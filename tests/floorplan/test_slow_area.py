@@ -104,6 +104,13 @@ def test_people_walk_on_and_runs_without_slow_areas_are_as_ever():
     assert digests(run(dry))["trajectories"] == digests(run(wet))["trajectories"]
 
 
+def test_slow_areas_are_the_same_for_every_span():
+    script = [{"at": "07:01", "slow": WET, "speed": "30 %", "stop": "4 s", "duration": "5 min"}]
+    assert digests(run(patrol(script=script))) == digests(
+        run(patrol(script=script, simulation={"max_span": 13}))
+    )
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [

@@ -3,6 +3,7 @@ import shapely
 from pydantic import ValidationError
 
 from fleet2d.errors import FloorPlanError
+from fleet2d.floorplan.native import Bundled
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.source import RoomCorrection, correct_rooms
 
@@ -51,6 +52,14 @@ def test_polygon_takes_its_cells_from_other_rooms(plan):
     ]
 
 
+def test_polygon_over_a_whole_room_replaces_it(plan):
+    corners = ((0.0, 0.0), (4.05, 0.0), (4.05, 9.0), (0.0, 9.0))
+
+    result = correct_rooms(plan, [RoomCorrection(polygon=corners, name="studio")])
+
+    assert [("room_1", "room"), ("studio", "room")] == names(result)
+
+
 @pytest.mark.parametrize(
     ("correction", "message"),
     [
@@ -84,3 +93,12 @@ def test_correction_that_fits_nowhere_is_an_error(plan, correction, message):
 def test_incomplete_correction_is_refused(content, message):
     with pytest.raises(ValidationError, match=message):
         RoomCorrection.model_validate(content)
+
+
+def test_scenario_corrects_the_rooms_of_any_source():
+    x, y = Bundled().load().room("kitchen_1").anchor_xy
+
+    source = Bundled.model_validate({"rooms": [{"at": [x, y], "name": "galley"}]})
+
+    room = source.plan().room_at(x, y)
+    assert ("galley", "kitchen") == (room.name, room.type)

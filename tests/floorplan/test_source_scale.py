@@ -61,3 +61,16 @@ def test_home_in_another_unit_is_told_with_the_line_to_type(scale):
         text = str(error)
 
     assert f"floorplan.scale={1 / scale:.3g}" in text
+
+
+def test_unit_is_told_by_the_width_of_doors():
+    in_feet = Synthetic(seed=3, scale=3.28084).plan()
+    (finding,) = [f for f in checkup(in_feet) if f.kind == "scale"]
+
+    assert "wrong" == finding.severity
+    assert "doors the plan is in feet: floorplan.scale=0.3048" in finding.text
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_home_in_metres_has_no_finding_on_its_scale(seed):
+    assert [] == [f for f in checkup(Synthetic(seed=seed).plan()) if f.kind == "scale"]

@@ -76,6 +76,19 @@ def test_furniture_on_the_stairs_bars_them(tmp_path):
     assert 2 == home.space(0.2, uses_portals=True).parts
 
 
+def test_way_leads_by_the_nearer_stairs(tmp_path):
+    far = {"start": [0.5, 0.5], "end": [12.5, 0.5], "type": "lift"}
+    plan = load_floorplan(house(tmp_path, portals=[STAIRS, far]))
+    space, at = Home(plan).space(0.2, uses_portals=True), plan.lattice.point_at
+
+    by_stairs = space.passings(at((4, 3)), at((9, 3)))
+    by_lift = space.passings(at((1, 1)), at((12, 1)))
+
+    assert [at((8.5, 3.5))] == [p.end for p in by_stairs]
+    assert [at((12.5, 0.5))] == [p.end for p in by_lift]
+    assert [at((0.5, 0.5))] == [p.end for p in space.passings(at((12, 1)), at((1, 1)))]
+
+
 @pytest.mark.parametrize(
     ("end", "problem"),
     [([6.5, 1], "is in no room of house: the nearest free place is ("),

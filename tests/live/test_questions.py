@@ -65,6 +65,22 @@ def test_conditions_select_rows(tables, condition, count):
     assert (found["rows"], len(found["shown"])) == (count, min(count, 1))
 
 
+def test_groups_have_sums_counts_and_durations(tables):
+    """How long in each room; its first, last and longest stay."""
+    stays = (
+        "WITH stays AS (SELECT entity, room, time, lead(time) OVER (PARTITION BY entity ORDER BY"
+        " step) - time AS stay FROM events) SELECT room, sum(epoch(stay)), count(*), min(time),"
+        " max(time), max(epoch(stay)) FROM stays WHERE entity = 'astro' GROUP BY room ORDER BY ALL"
+    )
+
+    assert rows(tables, stays) == [
+        ["hall", None, 1, "2026-01-05 07:06:40", "2026-01-05 07:06:40", None],
+        ["kitchen_1", 400.0, 3, "2026-01-05 07:00:00", "2026-01-05 07:01:40", 300.0],
+    ]
+    counts = "SELECT count(*) FILTER (WHERE event = 'user_seen'), count(DISTINCT room) FROM events"
+    assert rows(tables, counts) == [[3, 2]]
+
+
 def test_tables_are_joined_nested_and_ordered(tables):
     pairs = "SELECT a.step, b.step FROM events a JOIN events b USING (room) WHERE a.step < b.step"
 

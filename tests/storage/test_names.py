@@ -8,6 +8,7 @@ import yaml
 import fleet2d
 from fleet2d.artifacts.table import Column, TableSpec
 from fleet2d.errors import ArtifactError
+from fleet2d.expectations.parse import parse_expectation
 from fleet2d.storage.names import MOST_BYTES, problem_of
 
 # German, Arabic, Russian, Japanese, Hindi (with vowel signs, which are marks), Greek, Hebrew, Korean.
@@ -39,6 +40,12 @@ def test_name_of_any_script_is_one(name):
 )
 def test_what_is_no_name_is_said(name, problem):
     assert problem in (problem_of(name) or "")
+
+
+def test_expectations_read_a_name_as_it_is():
+    for name in NAMES:
+        if "-" not in name:
+            assert name in repr(parse_expectation(f"always(distance(astro, {name}) > 0.5 m)"))
 
 
 SCENARIO = {

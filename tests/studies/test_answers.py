@@ -7,8 +7,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+import fleet2d
 from fleet2d.errors import InputError
-from fleet2d.studies.answers import StudyAnswers, judged
+from fleet2d.studies.answers import StudyAnswers, judged, variance_ratio
 from fleet2d.studies.directory import Meta
 
 COLUMNS = ("method", "robot", "home", "seed")
@@ -81,6 +82,55 @@ def test_without_pairs_there_is_no_answer():
     frame = variants().filter((pl.col("method") == "new") == (pl.col("home") < 4))
     with pytest.raises(InputError, match="no two variants differ by method alone"):
         compare(frame)
+
+
+def test_the_ratio_of_variances_is_that_of_unpaired_to_paired():
+    generator = np.random.default_rng(2)
+    life = generator.normal(0, 1, 4000)
+    method_a, method_b = (life + generator.normal(0, 0.5, 4000) for _ in range(2))
+    assert 5.0 == pytest.approx(
+        variance_ratio(method_b, method_a), rel=0.1
+    )  # 2 × 1.25 / (2 × 0.25)
+
+
+@pytest.mark.slow
+def test_hanging_out_or_not_has_the_variance_in_pairs_that_is_promised(tmp_path):
+    """The same lives in the same homes; compared with runs whose home and seed are another's."""
+    patrol = {"type": "patrol", "cooldown": "1 h"}
+    hangout = {"type": "hangout", "source": "ltp", "near": "view", "period": "30 min"}
+    study = fleet2d.study(
+        {
+            "base": {
+                "extends": "bundled:paper",
+                "simulation": {"start": "2026-01-05T17:00", "duration": "5 h"},
+            },
+            "axes": {
+                "robot": {
+                    "options": {
+                        "off": {"robots.astro.behaviors": [patrol]},
+                        "on": {"robots.astro.behaviors": [hangout, patrol]},
+                    }
+                },
+                "home": {"synthetic": 3, "settings": {"furnish": True}},
+            },
+            "replicates": 6,
+            "keep": {"metrics": ["sightings.*", "distance.*"]},
+        },
+        tmp_path / "hangout",
+        executor="serial",
+    )
+    (walked,) = study.paired("distance.ana", {"robot": "off"}).to_dicts()
+    # Her life is the same, whatever the robot does.
+    assert (0, math.inf) == (walked["difference"], walked["variance_ratio"])
+    frame = study.variants.sort("home", "seed")
+    for metric in ("sightings.ana", "distance.astro"):
+        (row,) = study.paired(metric, {"robot": "off"}).to_dicts()
+        on, off = (
+            frame.filter(frame["robot"] == name)[metric].to_numpy() for name in ("on", "off")
+        )
+        unpaired = np.concatenate([on - np.roll(off, shift) for shift in range(1, len(on))])
+        assert 18 == row["pairs"] == len(on)
+        assert unpaired.var() / (on - off).var() == pytest.approx(row["variance_ratio"], rel=0.15)
 
 
 def test_an_effect_is_told_in_deviations_and_relative_to_the_reference():
@@ -217,3 +267,9 @@ def test_a_verdict_says_what_is_better():
     answers = Shares(by_method(HOMES.tolist(), worse.tolist()))
     (row,) = answers.paired("score", {"method": "old"}).to_dicts()
     assert "below old in 30 of 30 pairs, which is worse" == row["verdict"]
+
+
+def test_a_mean_against_most_pairs_tells_nothing_from_few_homes():
+    few = [-0.02, -0.01, -0.03, -0.02, 4.0, 4.2, 4.1]
+    (row,) = compare(by_method([0.0] * 7, few))
+    assert not row["clear"]

@@ -84,11 +84,13 @@ def test_it_goes_on_where_it_was_interrupted(undisturbed_dir, tmp_path):
 
 
 @pytest.mark.parametrize("file", ["results/000001.parquet", "tables/room_share/000001-*.parquet"])
-@pytest.mark.parametrize("harm", ["gone", "changed"])
+@pytest.mark.parametrize("harm", ["cut", "gone", "changed"])
 def test_what_is_damaged_is_run_again(copied, undisturbed_dir, file, harm):
     (path,) = copied.glob(file)
     if harm == "gone":
         path.unlink()
+    elif harm == "cut":
+        os.truncate(path, path.stat().st_size // 2)
     else:
         path.write_bytes(path.read_bytes()[:-9] + b"\0" * 9)
     executor, observer = CountingExecutor(), CollectingObserver()
@@ -226,6 +228,9 @@ def test_a_study_that_was_killed_while_it_began_is_run(undisturbed_dir, tmp_path
 def test_wrong_input_leaves_nothing_behind(tmp_path):
     with pytest.raises(ScenarioError):
         run(small(axes={SPEED: [0.3, "quick"]}), tmp_path / "study")
+    axes = {"start": {"key": "users.ana.start", "values": ["attic"]}}
+    with pytest.raises(ScenarioError):
+        run(small(axes=axes), tmp_path / "study")
     assert [] == list(tmp_path.iterdir())
 
 

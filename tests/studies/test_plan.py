@@ -38,6 +38,10 @@ def test_identities_are_the_same_at_each_call_and_differ_among_variants():
     assert 6 == len(set(identities()))
 
 
+def test_identities_stay_when_other_values_come():
+    assert set(identities()) < set(identities(axes={SPEED: [0.1, 0.3, 0.6]}, replicates=5))
+
+
 @pytest.mark.parametrize("change", [{"max_span": 60}, {"speedup": 1000}])
 def test_what_changes_no_result_changes_no_identity(change):
     assert identities() == identities(base=base(simulation=change))
@@ -196,6 +200,9 @@ def test_variants_without_a_metric_are_noted(tmp_path):
 
     rules = [{"when": {SPEED: 0.6}, "set": {"metrics.sightings": None}}]
     keep = {"metrics": ["sightings.*", "distance.*", "room_share.ana.kitchen_1"]}
+    compare = [{"metric": "distance.astroo", "against": {SPEED: 0.3}}]
+    with pytest.raises(ScenarioError, match="'astroo', which no variant has"):
+        check_study(small(rules=rules, keep=keep, compare=compare))
     run(small(rules=rules, keep=keep), tmp_path, observer=Notes())
     assert "3 of 6 complete variants have no metric sightings.*" in notes
     assert not any("distance" in note for note in notes)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from tests.scenes import flat_document
 from tests.studies.scenes import CountingExecutor, run
+from tests.studies.test_driver import CollectingObserver
 
 from fleet2d.configuration.documents import Document
 from fleet2d.errors import Fleet2DError, NoLayoutError, ScenarioError
@@ -206,6 +207,12 @@ def test_homes_of_files_are_chosen_among_those_that_fit_the_household(tmp_path):
     lives = find_lives(axis, "robot", Document({"floorplan": {"type": "bundled"}}))
     homes = {(choice.labels["people"], choice.labels["home"]) for choice in lives}
     assert {(1, "flat1"), (1, "flat3"), (3, "flat3")} == homes
+
+
+def test_what_is_left_out_is_noted_and_stored(tmp_path):
+    observer = CollectingObserver()
+    _, study = run(fleet(1, where={"people": 2}), tmp_path / "fleet", observer=observer)
+    assert "people is not 2" in study.meta.notes
 
 
 def test_a_cell_longer_than_a_name_of_a_file_is_no_file(tmp_path):

@@ -12,6 +12,7 @@ from tests.studies.test_population import fleet
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.studies.design import build_design
 from fleet2d.studies.driver import check_study
+from fleet2d.studies.intervals import two_sample_interval
 from fleet2d.studies.report import write_report
 from fleet2d.studies.rollout import RolloutAnswer, looks_of
 from fleet2d.studies.sentences import number
@@ -173,6 +174,14 @@ def test_a_robot_joins_at_the_same_stage_in_a_larger_fleet():
     settings = Rollout(change=[SLOWER], stages=STAGES, watch=["distance.astro"])
     assert "2026-01-06" == settings.stage_of(0.29)
     assert "2026-01-07" == settings.stage_of(0.3)
+
+
+def test_intervals_of_two_samples_are_wider_on_the_skewed_side():
+    generator = np.random.default_rng(0)
+    first, second = generator.lognormal(0, 1, 60), generator.normal(0, 1, 60)
+    low, high = two_sample_interval(first, second)
+    middle = first.mean() - second.mean()
+    assert high - middle > middle - low > 0
 
 
 @pytest.mark.slow

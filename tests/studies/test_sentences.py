@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -10,6 +11,7 @@ import pytest
 from scipy import stats
 from tests.studies.scenes import SPEED, base, run, small
 
+from fleet2d.errors import RunDirectoryError
 from fleet2d.studies.answers import StudyAnswers
 from fleet2d.studies.directory import Meta, MetricFacts
 from fleet2d.studies.intervals import ENOUGH_UNITS
@@ -79,18 +81,22 @@ def drawn(shape, homes, effect, chance=0) -> MadeUp:
     return of_homes(old=old, new=new + effect * np.std(draw(generator, 10_000)))
 
 
-SHAPES = {
+SHAPES: dict[str, Any] = {
     "normal": lambda g, n: g.normal(3, 1, n),
     "lognormal": lambda g, n: np.exp(g.normal(0, 1, n)),
+    "exponential": lambda g, n: g.exponential(1, n),
     "70 % are zero": lambda g, n: (g.random(n) < 0.3) * g.exponential(1, n),
     "one in ten": lambda g, n: np.where(g.random(n) < 0.1, 8.0, 1.0) * np.exp(g.normal(0, 0.3, n)),
+    "outliers": lambda g, n: g.standard_t(3, n),
+    "shares near 0": lambda g, n: g.beta(0.5, 9.5, n),
     "shares near 1": lambda g, n: g.beta(9.5, 0.5, n),
     "ties": lambda g, n: g.poisson(1, n).astype(float),
+    "bimodal": lambda g, n: g.choice([1.0, 3.0], n) + g.normal(0, 0.2, n),
 }
 DIFFERENCES = [0.1 * n - 0.9 + (3.0 if n == 4 else 0) for n in range(19)]
 NOISE = np.random.default_rng(4).normal(0, 1, 30)
 NOISE = (NOISE - NOISE.mean()) / NOISE.std(ddof=1)
-ODD = {
+ODD: dict[str, tuple[MadeUp, str]] = {
     "all failed": (
         made_up({"old": [[1]], "new": [[2]]}, "failed"),
         "of 2 variants 2 failed, most often because: no battery",
@@ -99,6 +105,7 @@ ODD = {
         made_up({"old": [range(8)], "new": [[s + 1 + s % 2 for s in range(8)]]}),
         "new against old, in 8 of 8 seeds; by how much can't be told",
     ),
+    "one home, said": (made_up({"old": [[1, 2]], "new": [[2, 4]]}), "It holds for 1 home only"),
     "one seed": (of_homes(old=[1, 2, 3], new=[1, 3, 2]), "It holds for 1 seed only"),
     "one pair": (made_up({"old": [[1]], "new": [[2]]}), "new against old: there is only one pair"),
     "no variance": (
@@ -115,8 +122,16 @@ ODD = {
         of_homes(old=[1, 2], new=[None, None]),
         "Can't be told: score with method = new, as none of its variants has it.",
     ),
+    "missing in one of three": (
+        of_homes(old=[1, 2], new=[2, 3], newer=[None, None]),
+        "score with method = newer, as none of its variants has it.",
+    ),
     "missing in all": (of_homes(old=[None, None], new=[None, None]), "Can't be told: "),
     "no number": (of_homes(old=[1, 2, 3], new=[math.nan, math.inf, 3]), "2 complete variants lack"),
+    "70 % are zero": (
+        of_homes(old=[0.0] * 20, new=[0.0] * 14 + [1.0, 2.0, 3.0, 1.0, 2.0, 1.0]),
+        "Can't be told: score",
+    ),
     "one in ten eight times": (
         of_homes(old=[0.0] * 10, new=[-0.7, -0.6, -0.8, -0.7, -0.5, -0.7, -0.6, -0.9, -0.7, 7.2]),
         "where the mean is 0.1 higher, but only 1 of 10 pairs are",
@@ -190,6 +205,8 @@ def test_a_study_that_goes_on_with_another_fleet_answers_for_that_one(tmp_path):
         return small(base=base(), axes=axes, replicates=1, compare=compare)
 
     run(fleet(0.2, 0.25), tmp_path / "study")
+    with pytest.raises(RunDirectoryError, match="2 of scenarios that the study no longer has"):
+        run(fleet(0.25, 0.3, 0.35), tmp_path / "study")
     _, study = run(fleet(0.25, 0.3, 0.35), tmp_path / "study", changed="redo")
     alone = run(fleet(0.25, 0.3, 0.35), tmp_path / "alone")[1].answer
     assert alone.table == study.answer.table

@@ -26,6 +26,15 @@ HOLDS = "always(distance(ana, astro) > 0)"
 FAILS = "never(moving(astro))"
 
 
+def test_what_holds_exits_with_0(fleet2d):
+    code, out, _ = fleet2d("test", written(apart=HOLDS), "--seeds", "3")
+
+    assert code == 0
+    assert "apart" in out
+    assert "3 of 3" in out
+    assert "\n1 of 1 expectation held.\n" in out
+
+
 @pytest.mark.slow
 def test_what_fails_is_told_kept_and_drawn(fleet2d):
     code, out, _ = fleet2d(

@@ -101,6 +101,20 @@ def test_trials_that_share_homes_tell_less_the_more_homes_differ():
     assert rate_interval(0, 4) == nested_rate_interval([[False] * 10] * 4)
 
 
+def test_the_interval_of_a_rate_holds_it_where_homes_differ():
+    generator = np.random.Generator(np.random.Philox(6))
+    inside = alone = 0
+    for _ in range(300):
+        rates = generator.beta(3, 1, 10)  # of homes; the mean is 0.75
+        held = generator.random((10, 8)) < rates[:, None]
+        low, high = nested_rate_interval(held.tolist())
+        inside += low <= 0.75 <= high
+        low, high = rate_interval(int(held.sum()), held.size)
+        alone += low <= 0.75 <= high
+    assert inside >= 0.9 * 300
+    assert alone < 0.9 * 300
+
+
 @pytest.mark.parametrize(("holds", "other"), [(1.0, 0.9), (0.9, 0.7), (0.95, 0.8)])
 def test_so_many_seeds_would_do_and_one_less_would_not(holds, other):
     needed = seeds_for(holds, other)

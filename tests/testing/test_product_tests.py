@@ -50,17 +50,17 @@ def test_tests_pass_for_the_product_and_fail_for_a_worse_robot(week, name):
 SCENARIOS = sorted(set(FOLDER.glob("*.yaml")) - {FOLDER / "home.yaml"})
 HOMES = range(10)
 MUTANTS = {
-    "change_night": ["VisitNextRoom"],
+    "change_night": ["VisitTwice", "VisitNextRoom"],
     "change_night_spring": [],  # the same, on another night
-    "call": ["ComeLate", "ComeAndGo"],
-    "find": ["FindOther", "FindLate"],
-    "follow": ["FollowOther", "FollowTooNear"],
-    "night_patrol": ["PatrolLate", "PatrolAnytime"],
-    "keep_out": ["PatrolWithoutAvoiding"],
-    "low_battery": ["DockLate"],
-    "guest": ["GreetAnybody", "GreetTooNear"],
+    "call": ["ComeLate", "ComeToNextRoom", "ComeAndGo"],
+    "find": ["FindOther", "FindLate", "FindTooNear", "FindFromAfar"],
+    "follow": ["FollowOther", "FollowTooNear", "FollowShortly"],
+    "night_patrol": ["PatrolLate", "PatrolWithoutFirst", "PatrolAnytime"],
+    "keep_out": ["PatrolNextRooms", "PatrolWithoutAvoiding"],
+    "low_battery": ["DockLate", "DockShortly"],
+    "guest": ["GreetAnybody", "GreetTooNear", "GreetAgain"],
     "fall_alarm": ["FindOther", "FindRarely"],
-    "medicine": ["VisitLate", "VisitNextRoom"],
+    "medicine": ["VisitLate", "VisitNextRoom", "VisitDaily"],
     "sleeping_baby": ["PatrolAnytime", "PatrolEverywhere"],
     "power_cut": ["AskLate", "AskWithoutSeeking"],
     "update_night": ["VisitLate", "VisitNextRoom"],
@@ -96,6 +96,12 @@ def test_each_scenario_of_two_robots_holds_and_fails_for_ghosts(path):
 def test_there_are_ten_scenarios_of_two_robots_of_at_most_twenty_lines():
     assert 10 == len(TWO_ROBOTS)
     assert max(len(path.read_text().splitlines()) for path in TWO_ROBOTS) <= 20
+
+
+def test_scenarios_are_of_at_most_twenty_lines_and_twenty_mutants():
+    assert sorted(MUTANTS) == [path.stem for path in SCENARIOS]
+    assert max(len(path.read_text().splitlines()) for path in SCENARIOS) <= 20
+    assert len({name for names in MUTANTS.values() for name in names}) >= 20
 
 
 def test_scenarios_are_of_at_most_twenty_lines_and_fail_for_mutants():

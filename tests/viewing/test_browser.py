@@ -1,5 +1,7 @@
 """The page, driven in Chromium: what it shows is what the run's tables say."""
 
+import json
+import math
 import re
 import shutil
 from contextlib import contextmanager
@@ -455,6 +457,20 @@ def test_note_at_a_moment_is_kept_and_found_again(browser, run_dir, tmp_path):
 
 
 @pytest.mark.slow
+def test_link_to_a_moment_is_copied(browser, address):
+    permissions = ["clipboard-read", "clipboard-write"]
+    with page_at(browser, address, permissions=permissions) as page:
+        page.fill("#goto", "day 1 05:00")
+        page.press("#goto", "Enter")
+        page.click("text=Copy link")
+        page.wait_for_selector("text=Copied")
+        link = page.evaluate("navigator.clipboard.readText()")
+    assert "at=2026-01-05T05%3A00%3A00" in link
+    with page_at(browser, link) as page:
+        shows_moment(page, 5 * 3600)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("zone", ["Pacific/Auckland", "America/Los_Angeles", "Asia/Kathmandu"])
 def test_times_are_the_home_s_in_every_time_zone(browser, address, zone):
     with page_at(browser, f"{address}#panel=metrics", timezone_id=zone) as page:
@@ -674,6 +690,30 @@ def test_exported_file_plays_without_a_server(browser, run_dir, tmp_path):
         assert path.x[3 * 3600 - 1] == pytest.approx(x, abs=1e-9)
         page.keyboard.press("Home")
         shows_step(page, 3600)
+
+
+@pytest.mark.slow
+def test_plan_of_4000_vertices_is_shown(browser, tmp_path):
+    turns = [2 * math.pi * i / 4000 for i in range(4000)]
+    far = [5 + 0.2 * (i * 7919 % 5) / 5 + math.sin(3 * turn) for i, turn in enumerate(turns)]
+    corners = [[8 + r * math.cos(a), 8 + r * math.sin(a)] for r, a in zip(far, turns, strict=True)]
+    plan = tmp_path / "round.json"
+    content = {"format": "fleet2d-floorplan", "version": 1, "free": [{"outline": corners}]}
+    plan.write_text(json.dumps(content))
+    run = fleet2d.run(
+        {
+            "simulation": {"start": "2026-01-05", "duration": "10 min", "seed": 1},
+            "floorplan": {"type": "native", "path": str(plan)},
+            "robots": {"astro": {"camera": {}, "behaviors": [{"type": "patrol"}]}},
+        }
+    )
+    with served(PageData(run)) as address, page_at(browser, address) as page:
+        page.keyboard.press("End")
+        shows_step(page, 599)
+        pictures = {page.locator(".plan canvas.top").screenshot()}
+        page.click("#tab-layers")
+        page.click("input[name=sight]")
+        add_new_picture(page, pictures)
 
 
 def test_damaged_run_is_explained_on_the_page(browser, tmp_path):

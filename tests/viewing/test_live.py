@@ -86,6 +86,20 @@ def test_body_is_put_somewhere_and_the_run_says_so(live):
     assert len(path.x) == live.run.manifest["steps"]
 
 
+def test_robot_that_is_called_comes_and_stays(live):
+    live.submit(order("step", value=60))
+    x, y = live.engine.simulation.home.plan.room("kitchen_1").anchor_xy
+    assert "" == live.submit(order("call", "astro", x=x, y=y))
+    live.submit(order("step", value=120))
+    state = live.engine.simulation.state["astro"]
+    assert "kitchen_1" == state["room"]
+    assert "" == live.submit(order("call", "astro", x=x + 0.5, y=y))
+    live.submit(order("step", value=1))
+    live.end()
+    actions = [entry["do"] for entry in live.run.manifest["interventions"]]
+    assert ["send", "send"] == actions
+
+
 MARKS = [(300, "shut bath_door"), (300, "replan astro")]
 
 

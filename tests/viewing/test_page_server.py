@@ -15,7 +15,7 @@ import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.viewing import page_server
 from fleet2d.viewing.page_data import PageData
-from fleet2d.viewing.page_server import PageServer, kept_token, page_app
+from fleet2d.viewing.page_server import PageServer, kept_token, new_token, page_app
 from fleet2d.viewing.served_runs import ServedRuns
 
 TOKEN = "0123456789abcdefghijABCDEFGHIJ01"
@@ -114,6 +114,12 @@ def test_browser_that_comes_before_the_server_runs_is_not_refused(run_dir):
         server.close()
 
 
+def test_tokens_differ_and_are_long():
+    tokens = {new_token() for _ in range(100)}
+    assert 100 == len(tokens)
+    assert min(map(len, tokens)) >= 32
+
+
 def client_of(*sources):
     return TestClient(page_app(ServedRuns(sources), "token", PORT), base_url=f"{OWN}/token/")
 
@@ -145,6 +151,12 @@ def test_facts_are_those_of_the_run(run_dir):
     assert ("algorithm", "layer", "log", "metric") == (
         roles["ltp"], roles["layer.dust"], roles["events"], roles["room_share"],
     )  # fmt: skip
+
+
+def test_part_of_a_table_is_served_by_range(run_dir):
+    answer = client_of(run_dir).get("run/0/tables/events.parquet", headers={"Range": "bytes=0-3"})
+    assert 206 == answer.status_code
+    assert b"PAR1" == answer.content
 
 
 def test_walls_change_when_a_door_moves(run_dir):

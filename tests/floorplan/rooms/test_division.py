@@ -43,6 +43,13 @@ def test_box_that_reaches_through_a_wall_ends_at_it():
     assert plan.room_at(4.5, 2.0) is plan.room("office_1")
 
 
+def test_box_that_is_too_small_for_its_chamber_has_all_of_it():
+    plan = build(space(LEFT, RIGHT, DOOR), bedroom=(1.3, 1.0, 3.9, 3.8), office=RIGHT)
+
+    assert {"bedroom_1", "office_1"} == set(areas(plan))
+    assert 9.0 == pytest.approx(plan.room("bedroom_1").area_m2, abs=0.1)
+
+
 def test_bounding_box_of_a_bent_room_leaves_the_small_room_in_its_corner_alone():
     walls = shapely.union_all([shapely.box(3, 3, 3.1, 5), shapely.box(3.1, 3, 4.2, 3.1)])
     free = shapely.difference(shapely.box(1, 1, 5, 5), walls)

@@ -91,6 +91,10 @@ def test_width_tells_doorways_from_openings_and_cracks(gap):
     assert (MIN_DOOR_M <= gap <= MAX_DOOR_M) == bool(plan.doorways)
 
 
+def test_thick_wall_has_one_doorway():
+    assert 1 == len(passages(rooms((1, 1, 4, 4), (4.4, 1, 7, 4), (4.0, 2.0, 4.4, 2.9))))
+
+
 STUBS = shapely.union_all([shapely.box(0, 4, 4, 4.1), shapely.box(5.5, 0, 5.6, 3)])
 
 

@@ -36,6 +36,17 @@ def test_shut_door_opens_and_a_wall_along_the_whole_room_stays():
     assert not bridge_gaps(two_rooms("#"), 2)[0].any()
 
 
+def test_shut_door_that_is_thinner_than_its_wall_opens():
+    pixels = np.full((30, 32), ".")
+    pixels[:, 15:17] = "#"
+    pixels[5:14, 15] = "."  # a door of 0.9 m, one pixel thick, in a wall of two
+    raw = OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+    opened, _ = bridge_gaps(raw, 2)
+
+    assert np.array_equal(np.argwhere(opened), [[row, 16] for row in range(5, 14)])
+
+
 def test_wall_opens_where_a_robot_drove():
     raw = two_rooms("#")
     driven = np.zeros(raw.free.shape, np.bool_)
@@ -129,3 +140,12 @@ def test_a_place_that_a_robot_reached_is_no_ray():
     driven[30, 50] = True
 
     assert not drop_rays(raw, 0.3, driven)[0].any()
+
+
+def test_a_second_room_that_its_walls_enclose_is_no_ray():
+    pixels = np.full((24, 44), "#")
+    pixels[2:22, 2:20] = pixels[2:22, 24:42] = "."
+    pixels[11, 20:24] = "."
+    raw = OccupancyMap(pixels == ".", pixels == "#", 0.1)
+
+    assert not drop_rays(raw, 0.3, np.zeros(raw.free.shape, np.bool_))[0].any()

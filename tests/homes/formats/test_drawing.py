@@ -76,6 +76,17 @@ def test_rooms_without_a_way_to_the_rest_are_left_out_with_a_note(tmp_path):
     assert "left out: 5.72 m2 of free space" in plan.notes[0]
 
 
+def test_transparent_paper_is_paper(tmp_path):
+    images = pytest.importorskip("PIL.Image")
+    black = np.zeros_like(HOME)
+    pixels = np.dstack([black, black, black, np.where(HOME == WALL, 255, 0).astype(np.uint8)])
+    images.fromarray(pixels).save(tmp_path / "flat.png")
+
+    plan = read_image(tmp_path / "flat.png", 0.05)
+
+    assert shapely.equals_exact(read(tmp_path).polygons, plan.polygons).all()
+
+
 @pytest.mark.parametrize(
     ("pixels", "message"),
     [
@@ -158,6 +169,18 @@ def test_scanned_floor_with_gaps_is_whole(shared_data, name):
     assert plan.area_m2 > 40
     with pytest.raises(FloorPlanError, match="inside of an object"):
         read_image(folder / f"{name}.png", scale, close_gaps=0)
+
+
+@pytest.mark.slow
+def test_building_whose_ground_has_several_shades_of_grey_is_whole(shared_data):
+    path = shared_data / "captured" / "clutter" / "photo_2020-01-08_09-53-31.png"
+    if not path.exists():
+        pytest.skip(f"there is no {path}")
+
+    plan = read_image(path, 0.05)
+
+    assert "grey 212 is taken for unknown, and so are shades up to 220" in plan.notes[0]
+    assert plan.area_m2 > 700  # 332 m2 if the grey ground is floor that gaps lead to
 
 
 def test_compressed_picture_whose_ground_is_as_light_as_the_floor_is_read(tmp_path):

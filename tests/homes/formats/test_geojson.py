@@ -579,6 +579,28 @@ def test_storeys_of_openstreetmap_lie_side_by_side(tmp_path):
     assert "Kitchen" not in names
 
 
+@pytest.mark.parametrize("k", range(20))
+def test_three_centimetres_of_noise_keep_the_door(tmp_path, k):
+    """Rooms that touch up to a gap or an overlap of 3 cm."""
+    noise = noisy(k, 0.015)
+    rooms = [
+        feature(
+            ring(*(noise(corner) for corner in ((x, 0), (x + 4, 0), (x + 4, 3), (x, 3)))),
+            "room",
+            name=name,
+        )
+        for x, name in ((0, "Kitchen"), (4, "Bedroom"))
+    ]
+    door = feature(line(noise((4, 1)), noise((4, 1.9))), kind="door")
+
+    plan = read(tmp_path, *rooms, door, units="m")
+
+    assert 1 == len(plan.polygons)
+    assert [True] == [d.leaf for d in plan.doorways]
+    assert plan.doorways[0].width_m == pytest.approx(0.9, abs=0.1)
+    assert plan.area_m2 == pytest.approx(24 - 0.1 * 2.1, abs=0.3)
+
+
 def test_a_room_may_name_its_building(tmp_path):
     room = feature(box(0, 0, 4, 3), name="Kitchen", building="House A")
 

@@ -7,6 +7,7 @@ from tests.meshed_homes import plan_files
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.homes.formats.houseexpo import HouseExpo
+from fleet2d.kernels import label_parts
 
 SQUARE = [[0, 0], [4, 0], [4, 3], [0, 3]]
 
@@ -74,6 +75,15 @@ def test_every_plan_keeps_its_area_and_is_covered_by_disjoint_rooms(sample, cell
         assert counts.min() > 0, path.name
         for room in plan.rooms:
             assert room is plan.room_at(*room.anchor_xy), path.name
+
+
+def test_every_room_of_every_plan_is_connected(sample):
+    """One walks from any cell of a room to any other without leaving it."""
+    for path in sample:
+        plan = read_houseexpo(path)
+        for room in plan.rooms:
+            pieces = label_parts(plan.room_of_cell == room.index, False).max() + 1
+            assert 1 == pieces, (path.name, room.name)
 
 
 def test_every_box_of_every_plan_is_a_room_or_a_note(sample):

@@ -103,6 +103,20 @@ def test_rays_through_a_window_are_cut_off_just_behind_it():
     assert "that only passages narrower than 0.3 m join to the rest" in notes[0]
 
 
+def test_room_behind_a_gap_narrower_than_rays_is_left_out_and_behind_a_wider_one_kept():
+    both = np.concatenate([room(20, 20), room(20, 10)], axis=1)
+    wide, narrow = both.copy(), both.copy()
+    wide[10:13, 22:26] = "."
+    narrow[10:12, 22:26] = "."
+
+    wide_space, _ = free_space(as_map(wide), speck_area_m2=0.0, ray_width=0.3)
+    cut, notes = free_space(as_map(narrow), speck_area_m2=0.0, ray_width=0.3)
+
+    assert 400 + 12 + 200 == pixels_of(wide_space)
+    assert 400 + 2 == pixels_of(cut)
+    assert "2.06 m2 of free space, in pieces: 1, that only passages" in notes[0]
+
+
 def test_niches_and_corners_within_the_width_are_kept_whole():
     pixels = room(20, 20)
     pixels[10, 22:25] = "."  # an opening two pixels deep into what is unknown

@@ -69,6 +69,12 @@ def test_packed_pixels_that_look_like_white_space_and_comments_are_pixels(tmp_pa
     assert np.array_equal(values, read_grey(write(tmp_path, packed(values))).values)
 
 
+def test_plain_pixels_may_be_followed_by_comments(tmp_path):
+    content = plain(SHADES).replace(b"20 40", b"20 # 1 2 3\n40")
+
+    assert np.array_equal(SHADES, read_grey(write(tmp_path, content)).values)
+
+
 @pytest.mark.parametrize("encode", [packed, plain])
 @pytest.mark.parametrize(
     ("size", "message"), [(b"4 4", "it is cut off"), (b"4 2", "its header is wrong")]

@@ -230,6 +230,18 @@ def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chance
     assert "grey 211 is taken for unknown" in filled.notes[0]
 
 
+def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path):
+    pixels = ROOM.copy()
+    pixels[20:26, 30:36] = 230
+
+    plain = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey="none")
+    named = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey=230)
+
+    assert plain.area_m2 == pytest.approx(2.5)
+    assert not any("unknown_grey" in note for note in plain.notes)
+    assert named.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
+
+
 @pytest.mark.parametrize("ground", [255, 240, 215])
 @pytest.mark.parametrize("settings", [{}, {"unknown_grey": "none"}, {"unknown_grey": "ground"}])
 def test_ground_as_light_as_the_floor_is_refused_without_a_key_that_would_not_help(
@@ -290,6 +302,21 @@ def test_transparent_pixels_of_a_png_are_unknown(tmp_path):
     plan = read_ros(write(tmp_path, image="map.png"))
 
     assert 2.5 - 0.25 == pytest.approx(plan.area_m2)
+
+
+def test_cleaning_is_tuned_by_the_component(tmp_path):
+    pixels = ROOM.copy()
+    pixels[25, 25:29] = OCCUPIED  # 0.01 m2
+    pixels[20:22, 42:44] = FREE  # a gap in the wall, to the edge of the image
+    path = write(tmp_path, pixels)
+
+    cleaned = Ros(path=path).load()
+    plan = Ros(path=path, speck_area_m2=0, ray_width="1 cm").load()
+
+    assert 2.5 + 0.01 == pytest.approx(cleaned.area_m2)
+    assert 2.5 - 0.01 + 0.01 == pytest.approx(plan.area_m2)
+    assert 0 == len(cleaned.polygons[0].interiors)
+    assert 1 == len(plan.polygons[0].interiors)
 
 
 # --- Cleaning and straightening -----------------------------------------------------------------

@@ -86,6 +86,13 @@ def test_the_front_of_furniture_is_its_lower_side_turned_clockwise(tmp_path, ang
     assert heading == pytest.approx(plan.objects[0].heading, abs=1e-5)
 
 
+def test_walls_alone_enclose_the_home(tmp_path):
+    plan = load_floorplan(write(tmp_path, WALLS, DOOR))
+
+    assert plan.area_m2 == pytest.approx(2 * 3.9 * 3.9 + 0.1 * 0.9, abs=0.1)
+    assert 2 == len(plan.rooms)
+
+
 def test_level_is_chosen_by_name_and_else_all_lie_side_by_side(tmp_path):
     levels = (
         '<level id="a" name="Cellar" elevation="-250"/><level id="b" name="Ground" elevation="0"/>'
@@ -217,21 +224,24 @@ def test_houses_of_any_storeys_language_and_turn_are_the_home(tmp_path, k):
     assert (storeys, 1) == (home.space(0.2).parts, home.space(0.2, uses_portals=True).parts)
 
 
-@pytest.mark.parametrize("degrees", [-150, -30, 10, 90, 179, 270])
+@pytest.mark.parametrize("degrees", [-150, -90, -30, 10, 45, 90, 120, 179, 200, 270])
 def test_round_walls_bulge_by_their_arc(tmp_path, degrees):
     """The area changes by the segment of the circle; rooms reach to the wall."""
     angle = math.radians(degrees)
+    sides = [(0, 0, 800, 0), (800, 0, 800, 1400), (800, 1400, 0, 1400), (0, 1400, 0, 0)]
     areas = []
     for arc in (f'arcExtent="{angle}"', ""):
-        walls = f"""
-<wall xStart="0" yStart="0" xEnd="800" yEnd="0" thickness="10" {arc}/>
-<wall xStart="800" yStart="0" xEnd="800" yEnd="1400" thickness="10"/>
-<wall xStart="800" yStart="1400" xEnd="0" yEnd="1400" thickness="10"/>
-<wall xStart="0" yStart="1400" xEnd="0" yEnd="0" thickness="10"/>
-<room name="Hall"><point x="5" y="5"/><point x="795" y="5"/><point x="795" y="1395"/>
-<point x="5" y="1395"/></room>
-"""
-        areas.append(load_floorplan(write(tmp_path, walls)).area_m2)
+        walls = [
+            f'<wall xStart="{a}" yStart="{b}" xEnd="{c}" yEnd="{d}" thickness="10"'
+            f" {arc if k == 0 else ''}/>"
+            for k, (a, b, c, d) in enumerate(sides)
+        ]
+        room = (
+            '<room name="Hall"><point x="5" y="5"/><point x="795" y="5"/><point x="795" y="1395"/>'
+        )
+        areas.append(
+            load_floorplan(write(tmp_path, *walls, f'{room}<point x="5" y="1395"/></room>')).area_m2
+        )
 
     radius = 8 / 2 / abs(math.sin(angle / 2))
     segment = radius**2 / 2 * (angle - math.sin(angle))

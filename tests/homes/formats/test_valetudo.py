@@ -219,6 +219,18 @@ def test_wall_removes_floor_with_a_note(tmp_path):
     assert "4 pixels are floor and wall: they count as wall" in plan.notes
 
 
+def test_room_inside_a_ring_of_wall_is_apart(tmp_path):
+    """An outline in the hole of another one."""
+    inner = runs(20, 20, 30, 30)
+    outer = [*runs(10, 10, 40, 15), *runs(10, 35, 40, 40), *runs(10, 15, 15, 35)]
+    outer += runs(35, 15, 40, 35)
+
+    plan = home(tmp_path, layer("floor", [*outer, *inner]))
+
+    assert pytest.approx((900 - 400 + 100) * PIXEL_AREA) == plan.area_m2
+    assert [0, 1] == sorted(len(polygon.interiors) for polygon in plan.polygons)
+
+
 # --- Rooms --------------------------------------------------------------------------------------
 
 
@@ -353,7 +365,7 @@ def test_map_without_path_and_with_a_charger_far_from_all_floor_is_read(tmp_path
     assert read_valetudo_charger(write(tmp_path, vacuum_map())) is None
 
 
-@pytest.mark.parametrize("points", [None, [1], [1, "2"], [1, float("nan")], [1, 1e99]])
+@pytest.mark.parametrize("points", [None, [1], [1, "2"], [1, True], [1, float("nan")], [1, 1e99]])
 @pytest.mark.parametrize("read", [read_valetudo_path, read_valetudo, read_valetudo_paths])
 def test_damaged_path_is_refused(tmp_path, read, points):
     bad = {"type": "path", "points": points}

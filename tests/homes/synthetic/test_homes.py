@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import shapely
 from tests.thorough import some
 
 from fleet2d.errors import FloorPlanError
@@ -38,6 +39,14 @@ def home(seed, **settings):
     return Synthetic(seed=seed, **settings).load()
 
 
+def reachable_rooms(plan):
+    links = [door.rooms for door in plan.doorways]
+    reached = {plan.room_at(*plan.entrance).index}
+    for _ in plan.rooms:
+        reached |= {a for pair in links for a in pair if reached & set(pair)}
+    return reached
+
+
 def content(house):
     """The digest of the content of a floor plan, independent of how plans are stored."""
     gaps = [(*gap.wall, gap.low, gap.high, gap.leaf) for gap in (*house.gaps, house.front_door)]
@@ -56,6 +65,20 @@ def test_seed_whose_first_areas_fit_into_no_layout_gets_another_area():
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_home_is_in_one_part_for_a_body_and_every_room_can_be_reached_by_doorways(seed):
+    plan = home(seed)
+    assert () == plan.notes
+    assert 1 == len(plan.polygons)
+    assert set(range(len(plan.rooms))) == reachable_rooms(plan)
+    # Free space that a disc of 0.25 m can be in stays in one part, with a piece in every room.
+    scale = plan.lattice.units_per_m
+    space = shapely.buffer(plan.polygons[0], -0.25 * scale, join_style="mitre")
+    assert "Polygon" == space.geom_type
+    for room in plan.rooms:
+        assert shapely.intersects_xy(space, *plan.lattice.to_lattice(room.anchor_xy)), room.name
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_doorways_are_as_wide_as_a_body_needs_and_lead_where_they_should(seed):
     plan = home(seed)
     assert all(door.width_m >= 0.7 - 1e-9 for door in plan.doorways)
@@ -64,6 +87,11 @@ def test_doorways_are_as_wide_as_a_body_needs_and_lead_where_they_should(seed):
     assert front.rooms[0] == front.rooms[1] == plan.room_at(*plan.entrance).index
     inner = [door for door in plan.doorways if door is not front]
     assert all(door.rooms[0] != door.rooms[1] for door in inner)
+    # No route leads through a bathroom or a bedroom, except to a room that belongs to it.
+    for room in (room for room in plan.rooms if room.type in PRIVATE):
+        doors = [door for door in inner if room.index in door.rooms]
+        others = {plan.rooms[sum(d.rooms) - room.index].type for d in doors}
+        assert 1 == len(doors) or (room.type == "bedroom" and len(others - PRIVATE) <= 1)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -97,7 +125,7 @@ def test_seed_gives_the_home_that_it_gives_on_every_machine(seed):
     [(36, 1, 1), (62, 2, 1), (90, 2, 2), (120, 3, 2), (186, 3, 2), (240, 5, 3), (300, 4, 3)],
 )
 def test_area_and_rooms_are_as_requested(area, bedrooms, bathrooms):
-    for seed in range(2):
+    for seed in range(4):
         plan = home(seed, area_m2=area, bedrooms=bedrooms, bathrooms=bathrooms)
         types = [room.type for room in plan.rooms]
         assert area == pytest.approx(plan.area_m2, rel=0.05)

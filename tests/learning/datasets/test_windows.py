@@ -40,7 +40,7 @@ def test_there_is_a_window_for_each_belief_of_each_user(tables):
         assert np.abs(part.beliefs["routine"].sum(axis=1) - 1).max() < 1e-5
 
 
-@pytest.mark.parametrize("last", [8, 25])
+@pytest.mark.parametrize("last", [8, 19, 25, 38])
 def test_evidence_after_a_window_changes_nothing_in_it(tables, last):
     """Every column of evidence is changed from the step after a window on; features until then are
     the same.

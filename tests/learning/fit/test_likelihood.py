@@ -48,6 +48,27 @@ def test_the_fit_of_a_constant_is_the_share():
     assert (top.low, top.high) == pytest.approx((inside[0], inside[-1]), abs=1e-4)
 
 
+@pytest.mark.slow
+def test_large_logs_give_the_true_parameters():
+    log = simulated(3, 80_000, bearing=True, turned=True)
+    factors = [
+        Constant("top", len(log)),
+        Falling("distance", log.distance),
+        Falling("bearing", log.bearing),
+        Orientation(log.orientation),
+    ]
+    likelihood = ProductLikelihood(factors, log.detected)
+    best = likelihood.fit()
+    index = 0
+    for factor in factors:
+        for i, name in enumerate(factor.names):
+            assert TRUE[name] == pytest.approx(factor.natural(i, best.theta[index]), rel=0.05), name
+            index += 1
+    assert best.shares == pytest.approx(
+        shares(log.distance, log.bearing, log.orientation), abs=0.02
+    )
+
+
 def missed(logs: Iterable[DetectionLog], factors_of: Callable[[DetectionLog], Any]) -> Counter[str]:
     """Count by parameter the logs whose intervals don't hold the truth."""
     misses = Counter()

@@ -1,5 +1,6 @@
 """Trace events have the structure that Perfetto and Chrome read, and what the run stored."""
 
+import itertools
 import json
 from pathlib import Path
 
@@ -51,6 +52,15 @@ def test_each_body_is_a_process_and_each_part_of_it_a_named_track(tmp_path):
 
     assert {1: "ana (person)", 2: "astro (robot)"} == {e["pid"]: e["args"]["name"] for e in names}
     assert list(enumerate(TRACKS, 1)) == [(e["tid"], e["args"]["name"]) for e in tracks]
+
+
+def test_slices_of_a_track_do_not_overlap(tmp_path):
+    events = trace(tmp_path)
+    for pid in (1, 2):
+        for tid in range(1, len(TRACKS) + 1):
+            own = [e for e in events if (e["ph"], e["pid"], e["tid"]) == ("X", pid, tid)]
+            spans = [(e["ts"], e["ts"] + e["dur"]) for e in own]
+            assert all(a[1] <= b[0] for a, b in itertools.pairwise(spans)), (pid, tid)
 
 
 def test_times_are_microseconds_since_the_start(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tests.live.exporters.worlds import END, FIRST, day, part, poses, rows
 from tests.scenes import process
+from tests.two_storeys import PLAN
 
 import fleet2d
 from fleet2d.errors import RunDirectoryError
@@ -115,6 +116,29 @@ def test_odometry_has_the_poses_and_the_speeds_between_them(messages):
     assert_poses(poses("astro"), found)
     moved = np.hypot(*np.diff(np.array(found)[:, 1:3], axis=0).T)
     np.testing.assert_allclose(moved / 30, speeds[1:], atol=1e-12)
+
+
+def test_a_robot_on_stairs_has_no_speed_of_their_length_in_the_plan(tmp_path):
+    """The ends of the stairs are 10 m apart there, which was a speed of 10 m/s."""
+    from rosbags.highlevel import AnyReader
+
+    (tmp_path / "house.json").write_text(json.dumps(PLAN))
+    run = fleet2d.run(
+        {
+            "simulation": {"duration": "2 min"},
+            "floorplan": {"type": "native", "path": str(tmp_path / "house.json")},
+            "users": {},
+            "robots": {"astro": {"climbs": True, "behaviors": [], "start": [1.0, 2.0]}},
+            "script": [{"at": "5 s", "send": "astro", "to": "above"}],
+        }
+    )
+    export_rosbag2(run, tmp_path / "bag", Selection.of(run))
+    with AnyReader([tmp_path / "bag"]) as reader:
+        odometry = [c for c in reader.connections if c.topic == "/astro/odom"]
+        messages = [reader.deserialize(d, c.msgtype) for c, _, d in reader.messages(odometry)]
+    speeds = [math.hypot(m.twist.twist.linear.x, m.twist.twist.linear.y) for m in messages]
+    assert messages[-1].pose.pose.position.x > 6
+    assert 0.5 < max(speeds) < 0.7
 
 
 @pytest.mark.parametrize("export", [export_mcap, export_rosbag2])
