@@ -12,6 +12,7 @@ from fleet2d.entities.robots.find import Find
 from fleet2d.entities.robots.follow import Come, Follow
 from fleet2d.entities.robots.interact import Interact, Opportunistic
 from fleet2d.entities.robots.patrol import Patrol, Scheduled
+from fleet2d.runtime.clock import midnight_of
 
 LATE = timedelta(seconds=30)
 MUCH_LATER = timedelta(minutes=30)
@@ -55,6 +56,20 @@ class ComeLate(Late, Come):
     """Comes 30 s late."""
 
 
+class ComeToNextRoom(Come):
+    """Comes to the next room."""
+
+    def decide(self, now: Situation) -> Plan | None:
+        command = now.take_command("come")
+        if command is None:
+            return super().decide(now)
+        names = [room.name for room in now.actor.reachable_rooms()]
+        target = now.actor.rooms(command.place)[0].name
+        other = names[(names.index(target) + 1) % len(names)]
+        self.command = command._replace(place=(other,))
+        return super().decide(now)
+
+
 class ComeAndGo(OtherSettings, Come):
     """Doesn't wait where it is called to."""
 
@@ -78,6 +93,27 @@ class FindLate(Late, Find):
     """Begins to look 30 s late."""
 
 
+class FindTooNear(Find):
+    """Drives up to the person whom it has found."""
+
+    def _approach(self, now: Situation, plan: Plan, x, y) -> Plan:
+        user, self.search = self.search.user, None
+        goal = now.home.plan.lattice.point_at((x, y))
+        return (
+            plan.note("found", user)
+            .go_to_point(*now.actor.point(now.home.plan.lattice.to_metres(goal).tolist()))
+            .stay(self.stay)
+        )
+
+
+class FindFromAfar(Find):
+    """Stays where it sees the person."""
+
+    def _approach(self, now: Situation, plan: Plan, x, y) -> Plan:
+        user, self.search = self.search.user, None
+        return plan.note("found", user)
+
+
 class FindRarely(OtherSettings, Find):
     """Looks half as often."""
 
@@ -96,6 +132,12 @@ class FollowTooNear(OtherSettings, Follow):
     settings: ClassVar = {"distance": 0.3}
 
 
+class FollowShortly(OtherSettings, Follow):
+    """Follows for a minute only, and then rests for an hour."""
+
+    settings: ClassVar = {"longest": "1 min", "cooldown": "1 h"}
+
+
 class PatrolLate(Late, Patrol):
     """Begins 30 s late."""
 
@@ -104,6 +146,17 @@ class PatrolAnytime(OtherSettings, Patrol):
     """Ignores its hours."""
 
     settings: ClassVar = {"when": []}
+
+
+class PatrolNextRooms(Patrol):
+    """Goes to the room after each of its rooms."""
+
+    def decide(self, now: Situation) -> Plan:
+        stops = self.stops
+        self.stops = [next_room(now, *stop) for stop in stops]
+        plan = super().decide(now)
+        self.stops = stops
+        return plan
 
 
 class PatrolEverywhere(OtherSettings, Patrol):
@@ -124,6 +177,12 @@ class DockLate(OtherSettings, Dock):
     settings: ClassVar = {"threshold": "3 %"}
 
 
+class DockShortly(OtherSettings, Dock):
+    """Leaves the charger too early."""
+
+    settings: ClassVar = {"until": "40 %"}
+
+
 class GreetAnybody(OtherSettings, Opportunistic):
     """Ignores whom to greet."""
 
@@ -136,11 +195,26 @@ class GreetTooNear(OtherSettings, Opportunistic):
     settings: ClassVar = {"distance": 0.3}
 
 
+class GreetAgain(OtherSettings, Opportunistic):
+    """Greets again every minute."""
+
+    settings: ClassVar = {"again": "1 min"}
+
+
 class VisitLate(Scheduled):
     """Sets out 30 s late."""
 
     def _due(self, since):
         yield from ((due + LATE, number) for due, number in super()._due(since - LATE))
+
+
+class VisitTwice(Scheduled):
+    """Comes back an hour later."""
+
+    def _due(self, since):
+        hour = timedelta(hours=1)
+        again = [(due + hour, number) for due, number in super()._due(midnight_of(since))]
+        yield from sorted([*super()._due(since), *(due for due in again if due[0] > since)])
 
 
 class VisitNextRoom(Scheduled):
@@ -152,6 +226,15 @@ class VisitNextRoom(Scheduled):
         plan = super().decide(now)
         self.stops = stops
         return plan
+
+
+class VisitDaily(Scheduled):
+    """Ignores the days of its visits."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _change(cls, data):
+        return {**data, "visits": [{**visit, "on": "daily"} for visit in data["visits"]]}
 
 
 class AskLate(Interact):

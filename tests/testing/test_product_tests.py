@@ -55,7 +55,7 @@ MUTANTS = {
     "call": ["ComeLate", "ComeToNextRoom", "ComeAndGo"],
     "find": ["FindOther", "FindLate", "FindTooNear", "FindFromAfar"],
     "follow": ["FollowOther", "FollowTooNear", "FollowShortly"],
-    "night_patrol": ["PatrolLate", "PatrolWithoutFirst", "PatrolAnytime"],
+    "night_patrol": ["PatrolLate", "PatrolAnytime"],
     "keep_out": ["PatrolNextRooms", "PatrolWithoutAvoiding"],
     "low_battery": ["DockLate", "DockShortly"],
     "guest": ["GreetAnybody", "GreetTooNear", "GreetAgain"],
@@ -102,12 +102,6 @@ def test_scenarios_are_of_at_most_twenty_lines_and_twenty_mutants():
     assert sorted(MUTANTS) == [path.stem for path in SCENARIOS]
     assert max(len(path.read_text().splitlines()) for path in SCENARIOS) <= 20
     assert len({name for names in MUTANTS.values() for name in names}) >= 20
-
-
-def test_scenarios_are_of_at_most_twenty_lines_and_fail_for_mutants():
-    assert sorted(MUTANTS) == [path.stem for path in SCENARIOS]
-    assert max(len(path.read_text().splitlines()) for path in SCENARIOS) <= 20
-    assert len({name for names in MUTANTS.values() for name in names}) >= 16
 
 
 @pytest.mark.slow
