@@ -90,6 +90,26 @@ def all_homes(shared_data: Path) -> Iterator[Home]:
     return map(houseexpo, plan_files(shared_data))
 
 
+def transformed(home, turn):
+    """Return the home with every corner moved by `turn`."""
+    return home_of([shapely.transform(p, turn) for p in home.polygons])
+
+
+def turns(home):
+    """Yield the eight ways to turn and mirror the square that holds the home."""
+    size = SUB * max(home.columns, home.rows)
+    for mirrored in (False, True):
+        for quarters in range(4):
+
+            def turn(points, quarters=quarters, mirrored=mirrored):
+                x, y = points[:, 0], points[:, 1]
+                for _ in range(quarters):
+                    x, y = size - y, x
+                return np.stack([size - x if mirrored else x, y], axis=1)
+
+            yield turn
+
+
 def shuffled(mesh: Mesh, rng: np.random.Generator, rounds: int = 8) -> Mesh:
     """Return another mesh of the same free space: random flips of edges between two triangles."""
     triangles = mesh.triangles.tolist()

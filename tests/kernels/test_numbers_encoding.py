@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.reference import encoding as slow
 
-from fleet2d.artifacts.unfinished import LINE, ArrayReader
+from fleet2d.artifacts.unfinished import GROWTH, HEADER, LINE, NARROW, RAW, RUNS, ArrayReader
 from fleet2d.kernels import encode_arrays
 
 RNG = np.random.default_rng(0)
@@ -87,3 +87,26 @@ def test_times_that_are_no_multiples_of_steps_are_no_line(times, steps):
 def test_what_no_column_holds_is_refused(wrong):
     with pytest.raises(TypeError, match="incompatible function arguments"):
         encode_arrays([np.zeros(3), wrong])
+
+
+@pytest.mark.parametrize(
+    ("values", "encoding"),
+    [
+        (np.repeat([1.0, np.nan, -0.0], 400), RUNS),
+        (np.full(1000, -1), RUNS),
+        (np.r_[np.arange(500), np.arange(9000, 9500)], GROWTH),
+        (np.arange(1000) * 300, NARROW),
+        (np.arange(1000, dtype=np.int32) % 3, NARROW),
+        (np.arange(1000, dtype=np.int32) % 3 - 1, RAW),
+        (np.arange(1000) * 2**40, RAW),
+    ],
+)
+def test_each_encoding_is_used_where_it_is_short(values, encoding):
+    assert encoding == encode_arrays([values])[0]
+
+
+@pytest.mark.parametrize("times", [STEPS * 1_000_000 + 5, STEPS * -3])
+def test_times_that_are_multiples_of_steps_are_a_line(times):
+    content, alone = encode_arrays([STEPS, times]), encode_arrays([STEPS])
+    assert content[len(alone)] == LINE
+    assert len(alone) + HEADER.size + 16 == len(content)

@@ -1,5 +1,6 @@
 """Headings against sines to sixty digits: neither libm nor rounding may show."""
 
+import hashlib
 from decimal import ROUND_HALF_EVEN, Decimal
 
 import numpy as np
@@ -26,6 +27,13 @@ from fleet2d.kernels import (
 
 # Two libms differ by an ulp of the sine, times UNIT: 2**-53 * 2**30.
 LIBM_ERROR = 2.0**-22
+
+
+def test_sines_are_pinned():
+    expected = "4c0e1da65ba03734026be97f8d3655689f8a33259be2b868f3f7511f9c5e3b28"
+
+    assert (np.int64, (2 * QUARTER + 1,)) == (SINES.dtype, SINES.shape)
+    assert expected == hashlib.sha256(SINES.astype("<i8").tobytes()).hexdigest()
 
 
 def test_sines_are_rounded_to_nearest_and_no_libm_can_disagree():
@@ -97,6 +105,14 @@ def test_heading_of_vectors_near_a_boundary_is_the_nearest():
         dx, dy = min(around, key=lambda v: abs(v[0] * s - v[1] * c))
 
         assert {int(heading_of(dx, dy))} == slow.nearest_headings(dx, dy)
+
+
+def test_no_lattice_vector_lies_right_between_two_headings():
+    """So no tie is ever broken: the smallest such vector would be longer than any plan."""
+    for part in range(1, 2 * TURN, 2):
+        c, s = int(half_sine(part + 2 * QUARTER)), int(half_sine(part))
+
+        assert max(abs(c), abs(s)) // np.gcd(c, s) > 2**15
 
 
 @given(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))

@@ -32,3 +32,24 @@ def test_nothing_is_moved_onto_itself(places):
 def test_mass_that_has_no_place_to_go_stays():
     start, end = np.array([[3.0, 0]]), np.array([[0, 1.0]])
     assert [2.0] == earth_mover(start, end, 2 - 2 * np.eye(2)).tolist()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whole_masses_are_moved_for_a_whole_cost(seed):
+    """To the last bit: nothing is rounded on the way to the least cost."""
+    random = np.random.default_rng(seed)
+    places = int(random.integers(1, 12))
+    start, end = random.multinomial(40, np.full(places, 1 / places), (2, 9)).astype(float)
+    at = random.integers(0, 9, (places, 2))  # many ways are equally long
+    metres = np.abs(at[:, None] - at).sum(axis=2).astype(float)
+
+    least = [transport(there, here, metres) for here, there in zip(start, end, strict=True)]
+
+    assert np.rint(least).tolist() == earth_mover(start, end, metres).tolist()
+
+
+def test_a_flow_is_undone_where_that_is_cheaper():
+    """The nearest pair first would cost 1 + 9; crossing over costs 2 + 2."""
+    metres = np.array([[0.0, 9, 1, 2], [9, 0, 2, 9], [1, 2, 0, 9], [2, 9, 9, 0]])
+    start, end = np.array([[1.0, 1, 0, 0]]), np.array([[0.0, 0, 1, 1]])
+    assert [4.0] == earth_mover(start, end, metres).tolist()

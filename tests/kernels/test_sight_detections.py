@@ -386,6 +386,27 @@ def test_looks_equal_the_reference(features, data, polygons, cameras, seed, coun
     assert_same(home, cameras, scene, first, stops, cuts)
 
 
+@quick
+@given(st.data(), homes(), st.lists(odd_eyes(), min_size=1, max_size=3), seeds())
+def test_looks_of_cameras_that_err_are_the_same_in_two_spans_as_in_one(
+    data, polygons, cameras, seed
+):
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    scene = scene_in(home, rng, 3, STEPS, data.draw(st.sampled_from([1.0, 0.2])))
+    errs, thickness = data.draw(errors_of(cameras, 3)), data.draw(st.sampled_from([0, 30]))
+    scene = replace(scene, perceptions=errs, thickness=thickness)
+    cut = data.draw(st.integers(1, STEPS - 1))
+
+    whole = looked(home, cameras, scene, 50)
+    memory, _ = nothing_known(cameras, scene)
+    first = looked(home, cameras, scene.part(0, cut), 50, memory=memory)
+    second = looked(home, cameras, scene.part(cut, STEPS), 50 + cut, memory=memory)
+
+    assert whole.sightings == first.sightings + second.sightings
+    assert whole.events == first.events + second.events
+    assert (whole.noticed, whole.seen) == (second.noticed, second.seen)
+
+
 @pytest.mark.parametrize("heights", [0, 7])
 def test_looks_past_bodies_and_furniture_in_one_room_equal_the_reference(heights):
     """Where they hide people often, and parts of them."""

@@ -11,7 +11,10 @@ from tests.meshed_homes import (
     awkward_points,
     behind_corners,
     home_of,
+    houseexpo,
     shuffled,
+    transformed,
+    turns,
 )
 from tests.reference.line_of_sight import nearest_cells_in_sight as nearest_slowly
 from tests.reference.line_of_sight import vertices_seen, visible
@@ -27,6 +30,11 @@ from fleet2d.kernels import (
 )
 
 EYES, POINTS = 2, 24
+
+
+def _sees_each(mesh, eye, points):
+    """Return which points the eye sees."""
+    return pairs_in_sight(mesh, np.broadcast_to(eye, points.shape), points)
 
 
 def check_against_every_wall(home, mesh, rng):
@@ -58,6 +66,22 @@ def test_line_of_sight_agrees_with_every_wall_of_real_homes(shared_data):
 
     for home in all_homes(shared_data):
         assert check_against_every_wall(home, home.mesh, rng) > 50
+
+
+@pytest.mark.parametrize("name", ["658e5214673c7a4e25b458e56bdb6144"])
+def test_line_of_sight_is_the_same_in_the_turned_and_mirrored_home(shared_data, name):
+    home = houseexpo(shared_data / "houseexpo" / f"{name}.json")
+    rng = np.random.default_rng(2)
+    eyes = awkward_points(home, rng, 6)
+    points = np.concatenate([awkward_points(home, rng, 40), home.mesh.vertices])
+    before = [_sees_each(home.mesh, eye, points) for eye in eyes]
+    assert 0.02 < np.mean(before) < 0.6
+
+    for turn in turns(home):
+        turned = transformed(home, turn)
+        moved = turn(points.astype(float)).astype(np.int64)
+        for eye, expected in zip(turn(eyes.astype(float)).astype(np.int64), before, strict=True):
+            assert np.array_equal(expected, _sees_each(turned.mesh, eye, moved))
 
 
 def sees(home, eye, point):

@@ -9,6 +9,8 @@ from tests.meshed_homes import (
     awkward_points,
     home_of,
     shuffled,
+    transformed,
+    turns,
 )
 from tests.reference import visible_cells as slow
 from tests.strategies import homes, quick, seeds
@@ -85,13 +87,18 @@ def test_cells_round_a_pillar_equal_brute_force(half, at):
         )
 
 
-def test_cells_are_those_in_line_of_sight_in_real_homes(shared_data):
-    rng, in_view = np.random.default_rng(8), 0
-    for home in all_homes(shared_data):
-        for _ in range(8):
-            pose, (near, far, half) = random_pose(home, rng), random_reach(rng)
-            reach = Reach(near**2, far**2, half)
-            mask = mask_in_view(home, home.mesh, pose, reach)
-            assert np.array_equal(by_lines(home, pose, reach), mask), pose
-            in_view += mask.sum()
-    assert in_view > 1000
+def test_cells_are_those_in_line_of_sight_in_real_homes_turned_and_mirrored(shared_data):
+    rng = np.random.default_rng(8)
+    compared = 0
+    for number, home in enumerate(all_homes(shared_data)):
+        for turn in [list(turns(home))[i] for i in (0, 1 + number % 7)]:
+            turned = transformed(home, turn)
+            for _ in range(6):
+                pose, (near, far, half) = random_pose(turned, rng), random_reach(rng)
+                reach = Reach(near**2, far**2, half)
+                expected = by_lines(turned, pose, reach)
+                assert np.array_equal(expected, mask_in_view(turned, turned.mesh, pose, reach)), (
+                    pose
+                )
+                compared += expected.size
+    assert compared > 200_000 * (number + 1)

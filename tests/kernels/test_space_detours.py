@@ -55,6 +55,16 @@ def test_nobody_in_the_way_leaves_the_shortest_way():
         assert np.array_equal(routes.around(*start, *goal, discs), shortest)
 
 
+def test_a_start_within_a_disc_is_left_away_from_its_middle():
+    routes = routes_of(home_of([shapely.box(0, 0, 4096, 4096)]))
+    discs = np.array([[2000, 2000, 300]])
+    assert routes.around(2200, 2000, 3500, 2000, discs) is not None
+    back = routes.around(2200, 2000, 500, 2000, discs)
+    assert back is not None
+    assert back[1, 0] >= 2200
+    assert routes.around(2000, 2000, 500, 2000, discs) is not None  # each way leads off the middle
+
+
 def test_there_is_no_way_to_a_goal_that_is_taken_or_walled_in_or_outside():
     routes = routes_of(home_of([shapely.box(0, 0, 4096, 640)]))
     assert routes.around(100, 300, 3000, 300, np.array([[3000, 300, 1]])) is None

@@ -30,6 +30,10 @@ def test_squared_distance_with_one_cell_outside_is_exact_across_the_grid():
     assert depth[299, 0] == 0
 
 
+def test_squared_distance_of_a_mask_without_outside_is_the_stated_bound():
+    assert np.array_equal(np.full((3, 4), 49), squared_distance(np.ones((3, 4), np.bool_)))
+
+
 @pytest.mark.parametrize("turns", [1, 2, 3])
 def test_squared_distance_is_the_same_on_every_side(turns):
     """Known failure 15: erosion with even kernels left other clearance on each side."""

@@ -56,3 +56,14 @@ def test_places_equal_the_slow_ones(shape, share, seed, group):
 
     expected = slow.group_places(floor, occupied, group)
     assert expected.tolist() == group_places(floor, occupied, group).tolist()
+
+
+def test_group_larger_than_the_room_has_no_place():
+    floor, occupied = floor_of((4, 6), 1.0, 0)
+    nothing = np.zeros_like(occupied)
+
+    assert len(group_places(floor, nothing, SMALL))
+    assert 0 == len(group_places(floor, nothing, SMALL._replace(width=7)))
+    assert 0 == len(group_places(floor, nothing, SMALL._replace(depth=6)))
+    assert 0 == len(group_places(floor, nothing, SMALL._replace(front=6)))
+    assert 0 == len(group_places(floor, ~nothing, SMALL))

@@ -89,7 +89,7 @@ def test_rings_run_along_every_side_once_with_the_mask_on_the_left(shape, share)
 
 @pytest.mark.parametrize("share", [0.5, 0.6, 0.7, 0.9])
 def test_rings_of_one_part_are_one_sound_polygon_that_covers_its_pixels(share):
-    for mask in masks((14, 11), share, 10):
+    for mask in masks((14, 11), share, 40):
         part = label_parts(mask, False)
         largest = part == np.argmax(np.bincount(part[mask]))
 

@@ -6,6 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.meshed_homes import (
+    all_homes,
     awkward_points,
     home_of,
     shuffled,
@@ -75,3 +76,16 @@ def test_rasterized_cells_are_those_strictly_inside_in_every_mesh(polygons, seed
     assert inside.tolist() == (triangle_of_cell.ravel() >= 0).tolist()
     for (x, y), triangle in zip(grid.tolist(), triangle_of_cell.ravel().tolist(), strict=True):
         assert triangle == (locate(mesh, x, y) if triangle >= 0 else -1)
+
+
+def test_cells_of_every_home_equal_the_free_cells_of_shapely(shared_data):
+    for home in all_homes(shared_data):
+        if home.rows * home.columns > 10**6:
+            continue
+        free = shapely.union_all(home.polygons)
+        shapely.prepare(free)
+        x, y = np.meshgrid(np.arange(home.columns) * 64 + 33, np.arange(home.rows) * 64 + 33)
+
+        is_free = rasterize_cells(home.mesh, home.rows, home.columns) >= 0
+
+        assert np.array_equal(shapely.contains_xy(free, x, y), is_free)

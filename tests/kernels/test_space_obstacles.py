@@ -50,6 +50,25 @@ def test_obstacles_and_cuts_equal_the_slow_ones(polygons, octagon, boxes):
     assert slow.table_of(extents, slanted) == slow.table_read(table)
 
 
+@quick
+@given(st.lists(box, min_size=1, max_size=8), octagons)
+def test_no_cut_leaves_as_many_pieces_or_fewer(boxes, octagon):
+    room = shapely.box(-64, -64, 900, 900)
+    table = wall_obstacles(*rings_of([room]), *octagon)
+    walls = [slow.shape_of(row) for row in table[:, :8].tolist()]
+    space = shapely.difference(room, shapely.union_all(walls))
+    for each in boxes:
+        table, cuts = add_obstacles(table, np.array([each]), *octagon)
+        shape = slow.shape_of(slow.grown(corners_of(each), *octagon))
+        pieces, left = (
+            sum(part.area > 0 for part in shapely.get_parts(polygons))
+            for polygons in (space, shapely.difference(space, shape))
+        )
+        assert cuts or left <= pieces
+        assert left <= pieces + cuts
+        space = shapely.difference(space, shape)
+
+
 def test_a_box_between_a_slanted_wall_and_another_may_cut():
     """Their octagons don't meet at the slanted wall itself, but may where it is at most."""
     tent = wall_obstacles(*rings_of([Polygon([(0, 0), (400, 0), (400, 300)])]), 20, 8)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given
-from tests.meshed_homes import home_of
+from tests.meshed_homes import home_of, shuffled
 from tests.reference.routes import graph_of, length_of, region_of, shortest, straight_ways
 from tests.strategies import homes, quick, seeds
 
@@ -81,6 +81,21 @@ def check_routes(home, rng, count):
 @given(homes(), seeds())
 def test_find_route_is_as_short_as_dijkstra_over_all_corners(polygons, seed):
     check_routes(home_of(polygons), np.random.default_rng(seed), 6)
+
+
+@quick
+@given(homes(), seeds())
+def test_find_route_does_not_depend_on_the_mesh(polygons, seed):
+    home, rng = home_of(polygons), np.random.default_rng(seed)
+    other = home._replace(mesh=shuffled(home.mesh, rng))
+    routes, other_routes = routes_of(home), routes_of(other)
+    points = some_points(home, rng, 8)
+
+    assert all(map(np.array_equal, legs_of(routes), legs_of(other_routes)))
+    for start, goal in zip(points[::2], points[1::2], strict=False):
+        path, same = routes.find(*start, *goal), other_routes.find(*start, *goal)
+        assert (path is None) == (same is None)
+        assert path is None or np.array_equal(path, same)
 
 
 def crowded(seed):

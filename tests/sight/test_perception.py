@@ -148,6 +148,32 @@ def test_false_positives_are_uniform_over_the_view():
         assert agree(inside, expected.mean(), z=5)
 
 
+def test_false_positives_at_a_spot_occur_only_while_it_is_in_view():
+    robot = np.tile([SIDE_M / 2, SIDE_M / 2, 0.0], (N, 1))
+    robot[N // 2 :, 2] = 180
+    spots = [
+        {"at": [12, 10], "per_hour": 360, "spread": 0.1},
+        {"at": [10, 12.9], "per_hour": 360},  # not within 60 degrees
+        {"at": [13.5, 10], "per_hour": 360},  # too far
+    ]
+    rows = ghosts(perception={"false_positives": {"spots": spots}}, robot=robot)
+    expected = N / 2 * 0.1
+    assert abs(len(rows) - expected) < 4.5 * np.sqrt(expected)
+    assert (rows[:, Column.STEP] < N // 2).all()
+    offset = rows[:, [Column.X, Column.Y]] / UNITS_PER_M - [12, 10]
+    for axis in (0, 1):
+        assert abs(offset[:, axis].mean()) < 5 * 0.1 / np.sqrt(len(rows))
+        assert abs(offset[:, axis].std() / 0.1 - 1) < 5 / np.sqrt(2 * len(rows))
+
+
+def test_false_positives_have_the_configured_identities():
+    users = np.concatenate([around(np.full(N, 9.9), np.zeros(N))] * 3)
+    perception = {"false_positives": {"per_hour": 900, "looks_like": {"cleo": 0.5, "ana": 0.2}}}
+    rows = Watch(users, camera={"range": [1, 3]}, perception=perception).look()
+    for identity, share in ((0, 0.2), (1, 0.0), (2, 0.5), (-1, 0.3)):
+        assert agree(rows[:, Column.IDENTITY] == identity, share)
+
+
 # --- Who it is taken for --------------------------------------------------------------------------
 
 
@@ -190,6 +216,22 @@ def check_noise(values, std):
     assert abs(z.std() - 1) < 4.5 / np.sqrt(2 * n) + 1e-3
     assert agree(np.abs(z) < 1, 0.6827, z=6)
     assert agree(np.abs(z) < 2, 0.9545, z=6)
+
+
+def test_postures_are_confused_as_configured():
+    posture = RNG.integers(0, 3, (1, N)).astype(np.int8)
+    confusion = {"stand": {"sit": 0.1}, "sit": {"stand": 0.2, "lie": 0.05}}
+    watch = Watch(
+        around(DISTANCE, BEARING),
+        perception={"attributes": {"posture": confusion}},
+        posture=posture,
+    )
+    rows = watch.look()
+    expected = [[0.9, 0.1, 0], [0.2, 0.75, 0.05], [0, 0, 1]]
+    for true in range(3):
+        perceived = rows[posture[0, rows[:, Column.STEP]] == true, Column.POSTURE]
+        for code in range(3):
+            assert agree(perceived == code, expected[true][code])
 
 
 def test_noise_has_its_size_at_each_distance_and_bearing_and_heading_have_theirs():
