@@ -27,6 +27,15 @@ def columns(run, name="evidence"):
     return {k: np.array(v, object) for k, v in run.arrow(name).to_pydict().items()}
 
 
+def test_rows_are_of_the_bins_own_time(run):
+    rows = columns(run)
+
+    minutes = rows["bin"].astype(int) // 60 + 6 * 60
+    assert np.array_equal(minutes % 1440, rows["minute"].astype(int))
+    assert set(rows["day"]) == {np.datetime64("2026-01-05").astype(object).toordinal()}
+    assert (np.diff(rows["bin"].astype(int)) >= 0).all()
+
+
 def test_sightings_are_those_of_the_observations(run):
     rows, seen = columns(run), columns(run, "observations")
     of_ana = rows["user"] == "ana"

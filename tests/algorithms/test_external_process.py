@@ -83,6 +83,14 @@ def test_copies_and_checkpoints_continue_from_its_state():
     assert digests == {fleet2d.run(scenario(command)).digest}
 
 
+@pytest.mark.slow
+def test_every_span_length_gives_the_same_run():
+    content = scenario(PROGRAMS / "share.py", sends=["observations", "evidence", "poses"])
+    content["simulation"]["duration"] = "2 h"
+
+    assert len({fleet2d.run(content, max_span=span).digest for span in (600, None)}) == 1
+
+
 def program(folder, answers):
     """Write a program that answers all but the first message by Python code."""
     path = folder / "alg.py"
@@ -184,6 +192,13 @@ def test_a_program_that_answers_while_it_is_told_is_heard(tmp_path):
     )
 
     run = fleet2d.run(scenario(path, period="6 h", sends=["poses"]))
+
+    assert run.status == "complete"
+
+
+def test_a_program_runs_in_its_own_folder(tmp_path):
+    (tmp_path / "answer.json").write_text('{"type": "none"}')
+    run = fleet2d.run(scenario(program(tmp_path, "print(open('answer.json').read(), flush=True)")))
 
     assert run.status == "complete"
 
@@ -300,6 +315,13 @@ def test_a_program_whose_interpreter_is_missing_is_told(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ComponentError, match="can't be started by node: No such file"):
         fleet2d.run(robots(tmp_path / "rounds.mjs"))
+
+
+def test_a_copied_program_decides_as_the_first_one_would():
+    simulation = fleet2d.Simulation(robots(PROGRAMS / "rounds.py"))
+    simulation.advance(3600)
+
+    assert copy.deepcopy(simulation).run().digest == simulation.run().digest
 
 
 @pytest.mark.parametrize(

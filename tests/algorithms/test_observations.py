@@ -50,6 +50,12 @@ def test_activities_are_confused_at_the_configured_rates():
         assert agree(perceived == name, share)
 
 
+def test_perceived_activities_do_not_depend_on_other_queries():
+    every = list(range(5, 60))
+    whole = activities().perceived(rows(every)).tolist()
+    assert whole == [activities().perceived(rows([step])).tolist()[0] for step in every]
+
+
 def test_each_user_has_an_activity_and_nobody_has_none():
     two_users = activities()
     assert ["rest"] == two_users.perceived(rows([10], user=1)).tolist()

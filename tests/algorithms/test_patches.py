@@ -9,7 +9,7 @@ from tests.scenes import TESTS, everything, run
 
 import fleet2d
 from fleet2d import Algorithm
-from fleet2d.algorithms.evidence import patches_of, whole_rooms
+from fleet2d.algorithms.evidence import MAX_PATCHES, SIDE_M, patches_of, whole_rooms
 from fleet2d.algorithms.observations import NOWHERE
 
 HERE = f"{TESTS.as_posix()}/algorithms/test_patches"
@@ -30,6 +30,15 @@ def test_patches_divide_the_floor_of_each_room(shared_data):
         assert counts.tolist() == patches.cells.tolist()
         assert (np.diff(patches.room) >= 0).all()
         assert list(range(len(plan.rooms))) == patches.room[patches.first].tolist()
+
+
+def test_patches_are_boxes_of_about_a_metre_or_a_dozenth_of_the_room(shared_data):
+    for plan in plans(shared_data):
+        patches = patches_of(plan)
+        for patch, room in enumerate(patches.room.tolist()):
+            side = max(SIDE_M / plan.lattice.cell, (plan.rooms[room].cells / MAX_PATCHES) ** 0.5)
+            extent = np.ptp(np.argwhere(patches.of_cell == patch), axis=0) + 1
+            assert (extent <= 1.5 * side + 2).all()
 
 
 def test_whole_rooms_are_patches_by_themselves(shared_data):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from tests.entities.robots.test_interact import PILL, ana, home
-from tests.scenes import table
+from tests.entities.robots.test_interact import PILL, ana, events_of, home
+from tests.scenes import digests, table
 
 import fleet2d
 from fleet2d.algorithms.timing import (
@@ -104,6 +104,20 @@ def test_a_policy_knows_what_the_interaction_is_worth():
     assert {1.0} == set(table(run, "when")["chance"])  # the pill is worth 4
 
 
+def test_thompson_explores_less_the_more_it_knows():
+    few, many = (taught(ThompsonTiming(min_chance=0.0), count).chances() for count in (1, 40))
+
+    assert 0.05 < few[14, BEDROOM] < 0.6
+    assert many[14, BEDROOM] < 0.01
+
+
+def test_fixed_times_learn_nothing():
+    policy = taught(FixedTimes(hours=(7, 8)))
+    expected = np.zeros((24, ROOMS))
+    expected[[7, 8]] = 1
+    assert np.array_equal(expected, policy.chances())
+
+
 def timed(policy, duration="3 h", **changes):
     behaviors = [{"type": "interact", "timing": "when"}, {"type": "patrol"}]
     return home(
@@ -113,6 +127,38 @@ def timed(policy, duration="3 h", **changes):
         interactions={"pill": PILL | {"at": [], "every": "1 h", "within": "1 h"}},
         **changes,
     )
+
+
+def test_answers_reach_the_learner_and_its_chances_reach_the_robot():
+    policy = {"type": "thompson", "ask_at": 0.5}
+    run = fleet2d.run(timed(policy, users={"ana": ana(outcomes=("declined",))}))
+    rows = table(run, "when")
+    last = rows["step"] == rows["step"].max()
+    asked_in = {
+        (r, int(h))
+        for r, h, c in zip(
+            rows["room"][last], rows["hour"][last], rows["chance"][last], strict=True
+        )
+        if c < 0.45
+    }
+
+    assert any("kitchen" in str(room) for room, _ in asked_in)
+    assert {7, 8, 9} & {hour for _, hour in asked_in}
+    assert "opportunity" in {event for _, event in events_of(run, "opportunity")}
+
+
+def test_outside_of_the_fixed_times_nobody_is_asked():
+    run = fleet2d.run(timed({"type": "fixed_times", "hours": []}, "5 h"))
+    asks = [step for step, _ in events_of(run, "asks")]
+
+    assert len(asks) <= 1  # before the first answer there is no experience
+
+
+def test_spans_are_invisible_to_the_learner():
+    content = timed("thompson", "2 h")
+    content["users"]["ana"] = ana() | {"answers": {"defers": 0.5}}
+    other = {**content, "simulation": {**content["simulation"], "max_span": 7}}
+    assert digests(fleet2d.run(content)) == digests(fleet2d.run(other))
 
 
 def test_hours_that_no_day_has_are_refused():

@@ -58,6 +58,22 @@ def test_a_place_of_the_same_storey_is_as_far_as_ever(tmp_path):
     assert found == {"room": [], "point": [], "kinds": []}
 
 
+def test_the_nearest_is_on_the_same_storey(tmp_path):
+    found = verdicts(
+        tmp_path,
+        above="always(implies(room(ana) == above, nearest(ana) == luna))",
+        below="always(implies(room(ana) == below, nearest(ana) == astro))",
+    )
+
+    assert found == {"above": [], "below": []}
+
+
+def test_without_portals_the_plan_is_one_storey(tmp_path):
+    found = verdicts(tmp_path, stairs=False, body="never(distance(astro, ana) < 3 m)")
+
+    assert found == {"body": [(0, 59)]}
+
+
 def test_a_garage_that_nothing_joins_is_on_the_storey_beside_it(tmp_path):
     corners = [[0, -4], [5, -4], [5, -0.3], [0, -0.3]]
     garage = {"name": "garage", "type": "garage", "polygon": corners}

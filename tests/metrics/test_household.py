@@ -119,6 +119,14 @@ def test_terms_are_the_same_however_the_run_is_cut():
 
 
 @pytest.mark.parametrize(
+    ("activity", "expected"),
+    [("tv", True), ("cook", True), ("care", True), ("study", False), ("shower", False)],
+)
+def test_who_is_busy_has_no_time(activity, expected):
+    assert expected == has_time(activity)
+
+
+@pytest.mark.parametrize(
     ("place", "activity", "near", "disturbing"),
     [
         ("living_room", "sleep", 0, 60),

@@ -1,7 +1,8 @@
 """What came of interactions: counts, value, interruptions and attitudes, from known answers."""
 
+import numpy as np
 import pytest
-from tests.entities.robots.test_interact import PILL, ana, home
+from tests.entities.robots.test_interact import PILL, Scripted, ana, home
 from tests.scenes import table
 
 import fleet2d
@@ -60,6 +61,19 @@ def test_bad_times_count_by_activity_and_annoy():
     assert {"read": noticed} == numbers["interrupted"]
     assert numbers["annoyance"] > 0.2
     assert rows["willingness"].max() < 0.1
+
+
+def test_annoyance_and_burden_fade_between_the_prompts_of_a_run():
+    months = {"type": "fading", "annoyed_by": 1, "annoyance_lasts": "30 min"}
+    person = ana() | {"answers": Scripted(outcomes=("accepted",), months=months)}
+    pill = PILL | {"at": [], "every": "1 h", "within": "50 min"}
+    _, run = measured(users={"ana": person}, interactions={"pill": pill})
+    rows = table(run, "interactions")
+    (hours,) = np.diff(rows["asked_at"]) / 3600
+
+    # Each prompt adds 0.5 to annoyance, as she is available with even odds, and 1/7 to the burden.
+    assert [0.5, 0.5 + 0.5 * 0.25**hours] == pytest.approx(rows["annoyance"].tolist())
+    assert [1 / 7, (1 + np.exp(-hours / 168)) / 7] == pytest.approx(rows["burden"].tolist())
 
 
 def test_waking_somebody_is_counted():

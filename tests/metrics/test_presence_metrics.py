@@ -7,7 +7,7 @@ from datetime import datetime
 import numpy as np
 import pytest
 from tests.reference import presence as slow
-from tests.scenes import run, scenario, table
+from tests.scenes import digests, run, scenario, table
 
 import fleet2d
 from fleet2d.algorithms.presence.belief import Presence
@@ -208,6 +208,19 @@ def test_bins_without_a_reference_forecast_are_skipped():
     assert scores["reference_skill"] != scores["skill"]
 
 
+def test_bins_away_do_not_count_given_home(stored):
+    lived = places(stored, "ana")
+    at_home = sum(lived[end] != "away" for end in range(59, 10800, 60))
+    assert at_home == stored.metrics["at_home"]["ana"]["all"]["bins"]
+
+
+def test_metrics_change_nothing(stored):
+    without = digests(run(content(metrics={})))
+    with_ = digests(stored)
+    for name in ("trajectories", "observations", "ltp", "rtp"):
+        assert without[name] == with_[name]
+
+
 def test_forecasts_are_used_if_an_algorithm_has_no_track():
     stored = run(
         content(
@@ -266,6 +279,18 @@ def test_a_window_ignores_earlier_steps():
     rows = {name: table(stored, name, user="ana", room="kitchen_1") for name in ("new", "all")}
     assert rows["new"]["true_share"][-1] > 0.95
     assert rows["all"]["true_share"][-1] == pytest.approx(1 / 3, abs=0.02)
+
+
+def test_hours_of_the_week_are_compared_one_by_one():
+    week = {"type": "long_term_presence", "estimator": "sighting_share", "by": "hour_of_week"}
+    stored = run(
+        content(
+            algorithms={"week": week},
+            metrics={"e": {"type": "ltp_error", "of": "week", "given": "hour_of_week"}},
+        )
+    )
+    assert 0 < stored.metrics["e"]["ben"]["tv"] < 1
+    assert "earth_mover_m" not in stored.metrics["e"]["ben"]
 
 
 def test_walking_distances_are_symmetric_and_far_for_unreachable_rooms():

@@ -50,6 +50,12 @@ def test_more_subjects_than_columns_are_rows():
     assert ResultRow("user3", ["3"], "") == block.rows[4]
 
 
+def test_measures_without_a_subject_are_rows():
+    block = block_of("team", Interactions, {"kept": 0.5, "woke": 3})
+
+    assert ["team", "kept", "woke"] == [row.name for row in block.rows]
+
+
 def test_metric_that_measured_nothing_is_left_out():
     configured = {"power": {"type": "battery"}, "way": {"type": "distance"}}
 

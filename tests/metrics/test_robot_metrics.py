@@ -13,7 +13,7 @@ from tests.entities.robots.robots import CAMERA, events
 from tests.entities.robots.test_find import belief
 from tests.scenes import flat_document, run, scenario, table
 
-from fleet2d import Algorithm, Behavior
+from fleet2d import Algorithm, Behavior, Metric
 from fleet2d.configuration.components import lookup
 from fleet2d.metrics.metric import kaplan_meier, quantile, restricted_mean
 
@@ -160,6 +160,14 @@ def test_travel_counts_rests_apart_and_metres(stored):
     assert result["metres"] == pytest.approx(metres * 14.4)
 
 
+@pytest.mark.parametrize(("apart", "moves"), [(0.0, 2), (0.4, 1), (0.6, 0)])
+def test_rests_count_if_they_are_farther_apart(apart, moves):
+    walk = [[1.0, 3.0], [1.5, 3.0], [1.4, 3.0]]
+    tour = {"type": "patrol", "waypoints": walk, "dwell": "2 min", "start": [1.0, 3.0]}
+    content = scenario("6 min", robots={"astro": tour}, metrics={"travel": {"apart": apart}})
+    assert run(content).metrics["travel"]["astro"]["relocations"] == pytest.approx(moves * 240)
+
+
 def test_reach_time_is_the_distance_at_call_times_divided_by_speed(stored):
     calls = np.arange(0, 6000, 600)
     calls = calls[~poses(stored, "ana")["away"][calls]]
@@ -285,6 +293,39 @@ def test_events_that_never_happen_have_no_median_and_the_deadline_as_mean():
     curve = kaplan_meier([10.0, 10.0], [False, False])
     assert quantile(curve, 0.5) is None
     assert 10.0 == restricted_mean(curve, 10.0)
+
+
+class Diary(Metric):
+    """Keeps what plans said happened, period by period."""
+
+    def start(self, home):
+        self.events = []
+
+    def update(self, history, state):
+        self.events += [list(event) for event in history.events]
+
+    def result(self):
+        return {"events": self.events}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", ["1 s", "7 min", "1 d"])
+def test_history_has_the_events_of_the_table(period):
+    scenario_content = content()
+    scenario_content["simulation"]["duration"] = "40 min"
+    scenario_content["metrics"] = {"diary": {"type": f"{__name__}:Diary", "period": period}}
+    stored = run(scenario_content)
+    rows = table(stored, "events")
+    sights = np.isin(rows["event"], ["user_seen", "user_lost"])
+    rows["detail"] = np.where(sights, rows["user"], rows["detail"])
+    columns = [rows[name].tolist() for name in ("step", "entity", "event", "detail")]
+    expected = [list(row) for row in zip(*columns, strict=True)]
+    events = stored.metrics["diary"]["events"]
+    assert len(expected) > 10
+    assert sights.any()
+    # Rows of one step and body may be stored in another order.
+    assert sorted(map(str, expected)) == sorted(map(str, events))
+    assert [row[0] for row in events] == sorted(row[0] for row in events)
 
 
 # --- Events ------------------------------------------------------------------------------------

@@ -7,6 +7,8 @@ from tests.entities.robots.test_interact import PILL, home
 from tests.scenes import table
 
 import fleet2d
+from fleet2d.algorithms.algorithm import Algorithm
+from fleet2d.errors import ComponentError
 
 # She accepts at rest, whoever asks; a busy person never has time. The request comes up at 07:10.
 SURE = {"base": 50}
@@ -100,3 +102,14 @@ def test_times_are_compared_alike_whatever_the_period_and_the_spans():
     )
     for name in ("best_at", "best", "best_chance", "value"):
         assert one[name].tolist() == other[name].tolist() == steps[name].tolist()
+
+
+def test_algorithms_do_not_know_how_people_answer():
+    class Curious(Algorithm):
+        """Reads the truth."""
+
+        def update(self, history, state):
+            return {"n": len(history.answer_models)}
+
+    with pytest.raises(ComponentError, match="'answer_models' is ground truth"):
+        life(algorithms={"curious": Curious()})

@@ -128,6 +128,18 @@ class Sure(Model):
     assert {"bedroom_1"} == set(rows["room"])
 
 
+@pytest.mark.slow
+def test_a_longer_step_than_a_minute_makes_bins_of_a_step():
+    slow = content(
+        "2 d",
+        ltp={"type": "long_term_presence", "estimator": "likelihood"},
+        rtp={"type": "real_time_presence"},
+    )
+    slow["simulation"] |= {"step": "5 min"}
+    slow["artifacts"] |= {"trajectories": "off"}
+    assert len(table(fleet2d.run(slow), "rtp")["step"]) == 2 * 288 * 3 * 7
+
+
 def test_a_run_can_start_from_the_learned_state_of_another(tmp_path):
     algorithms = {
         "ltp": {"type": "long_term_presence", "estimator": "likelihood"},

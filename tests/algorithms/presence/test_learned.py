@@ -6,9 +6,10 @@ from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
-from tests.algorithms.presence.worlds import MONDAY, any_evidence, home_of
+from tests.algorithms.presence.worlds import MONDAY, any_evidence, evidence_of, home_of
 
 import fleet2d
+from fleet2d.algorithms.presence.belief import BeliefSeries
 from fleet2d.algorithms.presence.learned import WEIGHTS, LearnedModel, Weights, shipped_weights
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.learning.datasets.specification import plan_dataset
@@ -18,6 +19,32 @@ from fleet2d.learning.datasets.windows import windows_of
 from fleet2d.metrics.rtp_score import calibration_error
 
 LEARNED = {"rtp": {"type": "real_time_presence", "model": "learned"}}
+
+
+def begun(rooms=3, users=2):
+    model = LearnedModel()
+    model.begin(home_of(rooms), [f"u{i}" for i in range(users)], MONDAY)
+    return model
+
+
+def test_a_robot_that_never_looks_is_sure_of_nothing():
+    bins = evidence_of(np.zeros((1440, 5)), np.zeros((1440, 2, 5), np.int64))
+
+    home, away = begun(5, 1).observe(bins)
+
+    belief = np.append(home[-1, 0] * (1 - away[-1, 0]), away[-1, 0])
+    assert belief.max() < 0.9
+
+
+def test_forecasts_begin_with_the_present_belief():
+    model = begun(4, 1)
+    home, away = model.observe(any_evidence(5, users=1, bins=300, rooms=4))
+    now = model.presence(["u0"], MONDAY, 60_000_000, BeliefSeries(0, 1, home, away))
+
+    soon, late = (now.at(MONDAY + timedelta(minutes=minutes)) for minutes in (1, 10_000))
+
+    assert np.abs(soon.with_away("u0") - now.with_away("u0")).max() < 0.2
+    assert np.abs(late.with_away("u0") - now.with_away("u0")).max() > 0.01
 
 
 @pytest.mark.slow

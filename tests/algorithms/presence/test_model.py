@@ -143,6 +143,16 @@ def test_long_term_is_the_estimate_before_the_update():
         estimator.observe(part)
 
 
+def test_hour_of_week_distinguishes_hours():
+    bins = evidence(person(3 * DAY, 3, 5), 3, patrol, 5)
+    model = HourOfWeek(estimator=ExposureRatio(), smoothing=1)
+    now = followed(model, bins, 3, 1)
+    week = model.estimator.weekly(["u0"], MONDAY, 1)
+    for hours in (0, 5, 30):
+        later = MONDAY + timedelta(hours=hours, minutes=3)
+        assert week.at(later).share("u0").tolist() == now.at(later).share("u0").tolist()
+
+
 def test_markov_decay_is_the_row_of_the_power_since_the_last_sighting():
     watched, seen = np.ones((40, 3)), np.zeros((40, 2, 3), np.int64)
     seen[4, :, 1] = 1
@@ -220,3 +230,35 @@ def test_learning_continues_from_a_learned_state(cls):
     if cls in CHAINS:
         for part, same in zip(one.learner.people.model, other.learner.people.model, strict=True):
             assert np.array_equal(part, same)
+
+
+def sleeper(days, seed):
+    """Somebody in room 0 at night and in rooms 1 and 2 by day, for an hour or so at a time."""
+    random = np.random.default_rng(seed)
+    where, now = np.empty(days * DAY, np.int64), 0
+    for t in range(days * DAY):
+        night = not 7 * 60 <= t % DAY < 23 * 60
+        if random.random() < 1 / 60 or (now == 0) != night:
+            now = 0 if night else int(random.integers(1, 3))
+        where[t] = now
+    return where
+
+
+@pytest.mark.slow
+def test_models_with_hours_are_better_for_people_with_regular_hours():
+    """Log loss of the last 10 of 20 days, 2 runs of a person whose days are alike."""
+    scores = {cls: [] for cls in (SemiMarkov, RoutineModel)}
+    for seed in range(2):
+        where = sleeper(20, seed)
+        bins = evidence(where, 3, patrol, seed)
+        for cls, values in scores.items():
+            values.append(late_loss(followed(cls(), bins, 3, 1).track, where))
+    assert np.mean(scores[RoutineModel]) < 0.9 * np.mean(scores[SemiMarkov])
+
+
+def test_a_forecast_of_the_routine_uses_the_hours_until_then():
+    where = sleeper(8, 3)
+    now = followed(RoutineModel(), evidence(where, 3, patrol, 3), 3, 1)
+    night = now.at(MONDAY + timedelta(hours=3)).with_away("u0")
+    noon = now.at(MONDAY + timedelta(hours=13)).with_away("u0")
+    assert night[0] > 0.6 > 0.4 > noon[0]

@@ -74,6 +74,23 @@ def test_before_anything_is_learned_all_is_as_likely_and_stays_last_two_hours():
     assert [0.05, 0.05, 0.05, 0] == pytest.approx(model.restless[0].tolist())
 
 
+def test_transitions_are_counts_by_time_plus_one_prior_event():
+    layout = StateLayout(ROOM, np.array([0.5, 0.5, 1, 0.2, 0.3, 0.5, 1]), 3, 1, np.ones(4))
+    moments = layout.no_moments(1)
+    moments.time[0, 0] = 880.0
+    moments.exits[0, 0, [1, 3]] = 6.0, 3.0
+    moments.arrivals[0, :2] = 3.0, 7.0
+    moments.moves[0, 0] = 9.0
+    moments.rests[0, 0] = 971.0
+    model = model_of(moments, layout, PRIOR)
+    assert 1 - 10 / 1000 == pytest.approx(model.stay[0, 0])
+    entered = np.array([0.25, 6.25, 0.25, 3.25])  # to each room overall, and a quarter each
+    expected = (np.array([0, 6, 0, 3]) + np.append(0, entered[1:]) / entered[1:].sum()) / 10
+    assert expected.tolist() == pytest.approx(model.follow[0, 0, :4].tolist())
+    assert [3.5 / 11, 7.5 / 11] == pytest.approx(model.spread[0, :2].tolist())
+    assert 10 / 1000 == pytest.approx(model.restless[0, 0])
+
+
 def bins_of(shown, seen, start=0):
     """One user's evidence of two rooms, the first of two patches; bins of a minute of 10 steps."""
     shown, seen = np.array(shown, float), np.repeat(np.array(seen)[:, None], 2, axis=1)

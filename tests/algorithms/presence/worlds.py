@@ -86,6 +86,11 @@ def hangout(t, at, sees_person, sightings, random):
     return int(random.integers(len(sightings))) if explore else int(np.argmax(sightings))
 
 
+def follow(t, at, sees_person, sightings, random):
+    """Stay while the person is seen, else go from room to room."""
+    return at if sees_person else (at + 1) % len(sightings)
+
+
 def counts_of(seen):
     """The counts in an array (bins, users + 1, places)."""
     by_user = seen.transpose(1, 0, 2)
