@@ -73,3 +73,13 @@ def test_bodies_are_written_without_what_follows_and_read_the_same():
     assert (bodies.step, bodies.users, bodies.ask_at.tolist()) == (
         again.step, again.users, again.ask_at.tolist()
     )  # fmt: skip
+
+
+def test_what_is_forgotten_is_no_longer_told():
+    bodies = bodies_at(5, 7)
+    bodies.step = 4
+    bodies.follow(1, *planned((4, 20)))
+    bodies.forget(4)
+    assert [20] == bodies.block(4, 5).x[1].tolist()
+    with pytest.raises(ValueError, match="forgotten"):
+        bodies.pose_at(1, 3)

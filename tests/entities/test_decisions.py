@@ -88,6 +88,12 @@ def test_the_first_breaks_in_on_those_behind_it_when_it_said():
     assert ("errand", "1200") in rows
 
 
+def test_who_has_nothing_to_do_after_all_leaves_no_trace():
+    alone = run(home_with(["patrol"], "30 min", QUIET))
+    with_errand = run(home_with([errand(*range(1, 30), declines=True), "patrol"], "30 min", QUIET))
+    assert digests(alone) == digests(with_errand)
+
+
 @pytest.mark.parametrize(
     ("behaviors", "rows"),
     [

@@ -15,8 +15,9 @@ import fleet2d
 from fleet2d import Drive, Moment
 from fleet2d.configuration.components import components
 from fleet2d.entities.drive import Differential, breakpoints, estimate
+from fleet2d.entities.robots.approach import way_seconds
 from fleet2d.entities.robots.drives import Holonomic, Trapezoidal
-from fleet2d.errors import ComponentError
+from fleet2d.errors import ComponentError, ScenarioError
 from fleet2d.kernels import TURN, time_route
 from fleet2d.scenario.compose import compose
 
@@ -113,6 +114,24 @@ def test_a_drive_of_ones_own_passes_corners_that_it_does_not_mention():
     assert [54.0, 90.0] == pytest.approx([row[3] for row in driven(Flight())], abs=0.1)
 
 
+def test_a_drive_of_ones_own_in_a_file_beside_the_scenario(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "from fleet2d import Drive, Moment, Route\n"
+        "class Slow(Drive):\n"
+        "    '''Drives slowly.'''\n"
+        "    factor: float = 0.5\n"
+        "    def moments(self, route: Route) -> list[Moment]:\n"
+        "        metres = sum(leg.length for leg in route.legs)\n"
+        "        return [Moment(metres / route.speed / self.factor, metres, route.heading)]\n"
+    )
+    content = home_with([GO], "1 min", astro={"drive": {"type": f"{tmp_path}/mine:Slow"}})
+    ways = [
+        path(run(content, f"robots.astro.drive.factor={factor}"), "astro").x for factor in (1, 0.25)
+    ]
+
+    assert [6, 21] == [int(np.argmax(way > 3.99)) + 1 for way in ways]
+
+
 @pytest.mark.parametrize(
     ("moments", "words"),
     [
@@ -165,6 +184,22 @@ def test_errors_name_robot_drive_and_step(moments, words, monkeypatch):
     assert words in str(caught.value)
 
 
+def test_robots_think_that_a_way_takes_what_their_drive_takes():
+    times = {}
+    for drive in ("differential", "holonomic", "trapezoidal"):
+        simulation = fleet2d.Simulation(home_with([], "1 min", astro={"drive": drive}))
+        actor = simulation._state.actors[-1]
+        times[drive] = way_seconds(actor, actor.point((1, 3)), actor.point((1, 1)))
+        assert way_seconds(actor, actor.point((1, 3)), actor.point((1, 3))) == 0
+        assert [0, times[drive]] == pytest.approx(
+            actor.seconds(np.array([0.0, 2.0])).tolist(), abs=1e-3
+        )
+    assert times == pytest.approx(
+        {"differential": 2 / 0.6, "holonomic": 2 / 0.6, "trapezoidal": 2 / 0.6 + 0.6 / 0.5},
+        abs=1e-3,
+    )
+
+
 def test_another_type_in_an_override_replaces_the_keys_of_the_old_one():
     base = {"robots": {"astro": {"drive": {"type": "trapezoidal", "acceleration": 0.2}}}}
 
@@ -174,6 +209,18 @@ def test_another_type_in_an_override_replaces_the_keys_of_the_old_one():
     assert {"type": "holonomic"} == drive("robots.astro.drive=holonomic")
     assert {"type": "holonomic"} == drive("robots.astro.drive.type=holonomic")
     assert {"type": "trapezoidal", "acceleration": 1} == drive("robots.astro.drive.acceleration=1")
+
+
+def test_an_unknown_drive_is_refused_with_the_names_of_all():
+    with pytest.raises(ScenarioError) as caught:
+        fleet2d.load_scenario("bundled:paper", "robots.astro.drive=holonomc")
+    assert "did you mean 'holonomic'" in str(caught.value)
+
+
+def test_people_have_no_drive():
+    with pytest.raises(ScenarioError) as caught:
+        fleet2d.load_scenario("bundled:paper", "users.ana.drive=holonomic")
+    assert "drive" in str(caught.value)
 
 
 POINTS = st.lists(st.tuples(*[st.integers(-5000, 5000)] * 2), min_size=1, max_size=6)
@@ -216,7 +263,7 @@ def test_it_is_the_same_as_in_the_core(points, heading, speed, turn_rate):
     assert ((late >= -1) & (late <= 1 + np.arange(len(late)))).all()
 
 
-@pytest.mark.parametrize("metres", [0.01, 0.36, 1.0, 7.5])
+@pytest.mark.parametrize("metres", [0.01, 0.05, 0.36, 1.0, 7.5])
 def test_positions_and_speeds_are_those_of_the_profile(metres):
     rows = driven(Trapezoidal(acceleration=0.5, pieces=8), [(0, 0), (metres, 0)])
     time, x = np.array([(0, 0), *(row[:2] for row in rows)]).T

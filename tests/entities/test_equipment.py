@@ -96,6 +96,19 @@ def test_spans_do_not_show(camera):
     assert all(first == other for other in others)
 
 
+def test_nobody_moves_otherwise_and_off_is_as_if_it_were_not_there():
+    without, errs = run(lost()), run(lost(**WRONG))
+    for name in ("ana", "astro"):
+        assert np.array_equal(path(without, name).x, path(errs, name).x)
+    exact, inexact = table(without, "observations"), table(errs, "observations")
+    assert np.array_equal(exact["step"], inexact["step"])
+    assert "true_x" not in exact
+    assert np.array_equal(exact["x"], inexact["true_x"])
+    content = lost()
+    content["robots"]["astro"]["localization"] = None
+    assert digests(without) == digests(run(content))
+
+
 class Watch(Algorithm):
     """Tells where the robot believed to be at first."""
 

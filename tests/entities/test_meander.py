@@ -36,6 +36,19 @@ def test_turns_have_the_standard_deviation_asked_for():
     assert abs(turns.mean()) < 1
 
 
+def test_the_spread_does_not_depend_on_the_step():
+    content = walker("2 h", "250 ms", speed=0.02, turn_std_deg=20, turn_rate_deg=3600)
+    metres, turns = walk(content)
+    assert turns[metres > 0].std() == pytest.approx(20 * 0.5, rel=0.04)
+
+
+def test_turns_keep_to_the_turn_rate_also_at_walls():
+    metres, turns = walk(walker(turn_std_deg=90, turn_rate_deg=30))
+    for kind in (metres > 0, metres == 0):
+        assert np.abs(turns[kind]).max() <= 30
+        assert np.abs(turns[kind]).max() > 28
+
+
 def test_it_goes_on_from_where_another_behavior_left_it():
     content = walker()
     scripted = {"type": f"{OWN}:Scripted", "script": [(7.0, 6.0), 30]}

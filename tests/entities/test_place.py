@@ -50,6 +50,11 @@ def test_a_body_has_one_room_of_a_kind_however_it_is_listed():
     assert len(own) > 1
 
 
+def test_a_point_is_that_point_exactly():
+    body = actor()
+    assert [7.0, 1.0] == body.home.plan.lattice.to_metres(body.find([7.0, 1.0], 0, "spot")).tolist()
+
+
 def test_any_is_every_room_that_can_be_reached():
     body = actor()
     rooms = {room_of(body, body.find(["attic", "any"], k, "spot")) for k in range(200)}
@@ -95,6 +100,14 @@ def test_places_where_it_can_not_be_are_refused(place, words):
         actor().find(place, 0, "spot")
     for word in words:
         assert word in str(caught.value)
+
+
+def test_the_nearest_free_point_that_an_error_names_is_one_that_will_do():
+    body = actor()
+    with pytest.raises(PlacementError) as caught:
+        body.find([5.05, 1.0], 0, "spot")
+    x, y = str(caught.value).rpartition("[")[2].rstrip("]").split(",")
+    body.find([float(x), float(y)], 0, "spot")
 
 
 NO_PLACES = [5, True, [], "", [1.0], [1, 2, 3], ["kitchen", 1], [1, "kitchen"], {"x": 1}]

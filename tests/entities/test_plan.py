@@ -60,6 +60,45 @@ def minute(now):
     return now.plan().stay(timedelta(minutes=1))
 
 
+def test_a_turn_takes_the_long_way_if_told_to():
+    poses = path(run(lambda now: now.plan().turn_by(-1.5).stay(), turn_rate_deg=18), "ana")
+    turned = np.unwrap(poses.heading)
+    assert turned[:31] == pytest.approx(np.linspace(0, -3 * np.pi, 31), abs=0.01)
+    assert turned[32:] == pytest.approx(-3 * np.pi, abs=0.01)
+
+
+def test_a_plan_knows_the_time_up_to_which_it_is_made():
+    times = []
+
+    def decide(now):
+        plan = now.plan().stay(timedelta(seconds=90))
+        times.append((now.time, plan.time))
+        return plan
+
+    run(decide, duration="3 min")
+    start = datetime(2026, 1, 5, 7)
+    assert [
+        (start, start + timedelta(seconds=90)),
+        (start + timedelta(seconds=90), start + timedelta(minutes=3)),
+    ] == times
+
+
+def test_leaving_and_coming_home():
+    def decide(now):
+        plan = now.plan().leave_home().note("gone").stay(timedelta(seconds=60)).come_home()
+        return plan.note("back").stay()
+
+    stored = run(decide)
+    events = table(stored, "events")
+    assert ["left_home", "gone", "came_home", "back"] == events["event"].tolist()
+    gone, back = events["step"][0], events["step"][2]
+    away = path(stored, "ana").away
+    assert 60 <= back - gone <= 61
+    assert away[gone:back].all()
+    assert not away[:gone].any()
+    assert not away[back:].any()
+
+
 # --- Legs --------------------------------------------------------------------------------------
 
 
@@ -121,6 +160,16 @@ def test_notes_are_told_at_the_first_step_not_before_them():
     assert ["", "why", ""] == events["detail"].tolist()
 
 
+def test_the_first_behavior_with_a_plan_is_followed():
+    third, decide_third = recording_steps(minute)
+    second, decide_second = recording_steps(lambda now: minute(now) if now.step >= 120 else None)
+    first, decide_first = recording_steps(lambda now: minute(now) if now.step == 180 else None)
+    run(decide_first, decide_second, decide_third)
+    assert [0, 60, 120, 180, 240] == first
+    assert [0, 60, 120, 240] == second
+    assert [0, 60] == third
+
+
 # --- Who decides -------------------------------------------------------------------------------
 
 
@@ -144,6 +193,34 @@ def test_a_situation_tells_where_and_when_it_is():
         (start, (1.0, 3.0), "living_room_1", ()),
         (start, (7.0, 1.0), "kitchen_1", ()),
     ] == situations
+
+
+def test_draws_depend_on_body_purpose_and_step_only():
+    drawn = {}
+
+    def decide(now):
+        for purpose in ("this", "that"):
+            again = {now.random(purpose).uniform() for _ in range(2)}
+            assert 1 == len(again)
+            drawn[now.actor.name, purpose, now.step] = again.pop()
+        return minute(now)
+
+    fleet2d.run(scenario("3 min", users={"ana": entity_with(decide), "ben": entity_with(decide)}))
+    assert 12 == len(drawn) == len(set(drawn.values()))
+    before = dict(drawn)
+    drawn.clear()
+    fleet2d.run(
+        scenario(
+            "3 min",
+            users={
+                "cleo": entity_with(minute),
+                "ana": entity_with(minute, decide),
+                "ben": entity_with(decide),
+            },
+        )
+    )
+    assert 6 == len(drawn)
+    assert before.items() >= drawn.items()
 
 
 # --- Interruptions -----------------------------------------------------------------------------
@@ -174,6 +251,22 @@ def test_events_that_a_plan_names_end_it_at_the_next_step():
     last = np.searchsorted(seen["step"], events["step"], side="right") - 1
     expected = zip(events["step"] + 1, events["event"], ["ana"] * 3, seen["x"][last], seen["y"][last], strict=True)  # fmt: skip
     assert [*expected] == told
+
+
+def test_events_that_a_plan_does_not_name_leave_it_alone():
+    steps, decide = recording_steps(lambda now: now.plan().interrupt_on("user_lost").stay())
+    stored = fleet2d.run(watched(decide))
+    lost = table(stored, "events", event="user_lost")["step"].tolist()
+    assert [0, *(step + 1 for step in lost)] == steps
+
+
+def test_an_interrupted_body_goes_on_from_where_it_is():
+    def decide(now):
+        plan = now.plan().interrupt_on("user_lost", "user_seen")
+        return plan.go_to([1.0, 3.0] if now.events else [4.5, 0.6]).stay()
+
+    poses = path(fleet2d.run(watched(decide)), "astro")
+    assert np.hypot(np.diff(poses.x), np.diff(poses.y)).max() <= 0.6 + 2e-3
 
 
 # --- What a behavior may not do ----------------------------------------------------------------
@@ -233,3 +326,16 @@ def test_what_was_stored_before_a_failure_is_readable(tmp_path):
     stored = fleet2d.open_run(tmp_path / "run")
     assert ("failed", 120) == (stored.status, stored.manifest["steps"])
     assert [0, 60] == table(stored, "trajectories")["step"].tolist()
+
+
+def test_a_start_that_fails_is_named_and_nothing_is_written(tmp_path):
+    class Broken(Behavior):
+        def start(self, actor):
+            raise ValueError("not today")
+
+    content = scenario(users={"ana": {"behaviors": [Broken()]}})
+    with pytest.raises(
+        ComponentError, match=r"users\.ana failed when it was started: ValueError: not today"
+    ):
+        fleet2d.run(content, out=tmp_path / "run")
+    assert not (tmp_path / "run").exists()

@@ -63,6 +63,39 @@ def test_sleeper_lies_on_the_bed_and_faces_as_one_does_there(tmp_path):
     assert [0, 2] == [plan.posture_at(time_us) for time_us in (0, 30_000_000)]
 
 
+def test_body_has_the_posture_of_the_moment_in_a_plan_that_ends_standing(tmp_path):
+    sim = simulation(tmp_path)
+    sim.advance(30)
+    ana = sim.actors["ana"]
+
+    assert [0, 2, 0] == [ana.posture_code(seconds * 10**6) for seconds in (0, 30, 119)]
+
+
+def test_way_to_the_bed_goes_round_it(tmp_path):
+    sim = simulation(tmp_path)
+    sim.advance(1)
+    track = sim.actors["ana"].plan.finish().breakpoints
+    lattice = sim.home.plan.lattice
+    points = lattice.to_metres(np.stack([track.x, track.y], axis=1))
+    arrives = int(np.flatnonzero((np.abs(points - (4, 2.9)) < 0.001).all(axis=1))[0])
+    way = shapely.LineString(points[: arrives + 1])
+    assert way.distance(BED.footprint) >= 0.2
+
+
+def test_place_without_an_approach_is_stepped_to_from_beside_the_object(tmp_path):
+    sim = simulation(tmp_path, place=1)
+    sim.advance(30)
+    assert where(sim) == pytest.approx((4, 1.4), abs=1e-3)
+    sim.advance(89)
+    assert where(sim) == pytest.approx((0.5, 3.5), abs=1e-3)
+
+
+def test_use_is_told_in_the_events(tmp_path):
+    run = simulation(tmp_path).run()
+    rows = run.tables["events"].to_pylist()
+    assert [("uses", "bed")] == [(row["event"], row["detail"]) for row in rows]
+
+
 def test_object_without_a_place_is_refused(tmp_path):
     with pytest.raises(ComponentError, match="rug has no place to use it from"):
         simulation(tmp_path, thing="rug").run()

@@ -188,6 +188,24 @@ def test_a_robot_perceives_in_one_way(kitchen, change, message):
         fleet2d.Simulation(content)
 
 
+def test_there_must_be_users(kitchen):
+    content = scenario(kitchen) | {
+        "users": {"ana": None},
+        "algorithms": {"ltp": None},
+        "metrics": {},
+    }
+
+    with pytest.raises(InputError, match="there are no users to be perceived"):
+        fleet2d.Simulation(content)
+
+
+def test_its_camera_cannot_be_disturbed(kitchen):
+    simulation = fleet2d.Simulation(scenario(kitchen))
+
+    with pytest.raises(InputError, match="its cameras can't be changed"):
+        simulation.do({"switch_off": "astro", "camera": True})
+
+
 def both_ways(folder):
     """Return a scenario whose robot perceives somebody by a table, and the same by a script."""
     x, y = place("kitchen_1")
@@ -209,3 +227,10 @@ def test_detections_besides_the_cameras_are_injected_ones(tmp_path):
     assert table.tables["observations"].num_rows > 6
     for name in ("observations", "events", "key_frames"):
         assert table.tables[name].to_pylist() == script.tables[name].to_pylist()
+
+
+def test_detections_besides_the_cameras_are_the_same_for_every_span(tmp_path):
+    content, _ = both_ways(tmp_path)
+    content["robots"]["astro"]["perception"] = {"detection": {"posture": {"sit": 0.5}}}
+
+    assert len({fleet2d.run(content, max_span=span).digest for span in (7, 600, None)}) == 1

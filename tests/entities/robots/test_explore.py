@@ -34,6 +34,18 @@ def test_what_can_not_be_seen_is_given_up():
     assert "explored" == names(stored)[-1]
 
 
+@pytest.mark.parametrize("furnish", [False, True])
+def test_a_real_home_is_explored_in_minutes(furnish):
+    content = home_with(["explore"], "10 min")
+    content["floorplan"] = {"type": "bundled", "furnish": furnish}
+    content["users"] = {}
+    content["robots"]["astro"].pop("start")
+    stored = fleet2d.run(content)
+    assert "explored" == names(stored)[-1]
+    assert float(events(stored)[-1][2].split(" ")[0]) > 95
+    assert names(stored).count("explores") < 40
+
+
 def test_behind_a_shut_door_it_goes_on_once_that_is_open():
     agenda = [
         {"at": "07:00", "open": True},

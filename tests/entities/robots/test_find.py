@@ -1,5 +1,7 @@
 """Find: search for a person by what is believed, with a deadline, and a verdict."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from tests.entities.robots.robots import (
@@ -9,10 +11,13 @@ from tests.entities.robots.robots import (
     home_with,
     names,
 )
+from tests.reference.search import play
 from tests.scenes import path, run
 
 import fleet2d
 from fleet2d import Algorithm
+from fleet2d.entities.robots.find import Sites
+from fleet2d.entities.robots.search import SearchProblem, exact, order_by
 from fleet2d.errors import InputError
 
 POLICIES = ["random", "nearest", "likeliest", "greedy", "exact", "receding"]
@@ -80,6 +85,33 @@ def test_every_policy_finds_who_is_at_home_and_stays_with_her(policy):
     assert (poses.x[-1], poses.y[-1]) == pytest.approx((1.0, 3.0), abs=0.01)
 
 
+def test_in_a_real_home_the_exact_order_is_the_best_of_all(shared_data):
+    """Rooms, ways and looks as they are; chances by size, and drawn."""
+    for name in ("bundled", *sorted((shared_data / "houseexpo").glob("*.json"))[:2]):
+        content = home_with([search()], **belief(kitchen_1=1))
+        content["floorplan"] = "bundled"
+        if name != "bundled":
+            content["floorplan"] = {"type": "houseexpo", "path": str(name)}
+        content["robots"]["astro"].pop("start")
+        content["users"]["ana"] = "meander"
+        simulation = fleet2d.Simulation(content)
+        astro = simulation.actors["astro"]
+        sites = Sites(astro, 2)
+        now = fleet2d.Situation(astro, 0)
+        prior = np.random.default_rng(4).dirichlet(np.ones(len(sites)))
+        whole = sites.problem(now, prior)
+        few = np.arange(min(len(sites), 7))
+        part = SearchProblem(
+            whole.prior[few], whole.reach[few], whole.travel[np.ix_(few, few)],
+            whole.look[few], whole.detect[few],
+        )  # fmt: skip
+        best = min(play(part, order).cost for order in permutations(few.tolist()))
+        assert play(part, exact(part)).cost == pytest.approx(best)
+        costs = {p: play(whole, order_by(p, whole, now.random("x"))).cost for p in POLICIES}
+        assert costs["exact"] == min(costs.values())
+        assert max(costs, key=lambda policy: costs[policy]) in ("random", "nearest")
+
+
 def test_it_looks_first_where_it_is_told_to():
     times = []
     for room in ("bathroom_1", "bedroom_1"):
@@ -95,14 +127,15 @@ def test_it_gives_up_at_the_deadline():
     assert [(600, "find_begins"), (720, "gave_up")] == rows
 
 
-@pytest.mark.parametrize(("source", "out_at", "end"), [
-    ("rtp", 0.9, "not_at_home"),
-    ("rtp", 1, "gave_up"),  # never sure
-    (None, 0.8, "not_at_home"),  # while nothing says where people are, somebody may be out
+@pytest.mark.parametrize(("fields", "end"), [
+    ({"out_at": 0.9}, "not_at_home"),
+    ({"out_at": 1}, "gave_up"),  # never sure
+    # While nothing says where people are, somebody may be out, unless told otherwise.
+    ({"source": None, "out_at": 0.8, "deadline": "20 min"}, "not_at_home"),
+    ({"source": None, "out_at": 0.8, "deadline": "20 min", "out": 0}, "gave_up"),
 ])  # fmt: skip
-def test_it_says_not_at_home_once_all_is_looked_at_and_believed(source, out_at, end):
-    find = search(source=source, out_at=out_at)
-    content = home_with([find, STAY], "40 min", OUT, **belief(bathroom_1=1, away=0.6))
+def test_it_says_not_at_home_once_all_is_looked_at_and_believed(fields, end):
+    content = home_with([search(**fields), STAY], "40 min", OUT, **belief(bathroom_1=1, away=0.6))
     assert ["find_begins", end] == names(assert_same_for_every_max_span(content, 61))
 
 

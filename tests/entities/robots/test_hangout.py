@@ -92,6 +92,18 @@ def test_it_stands_still_in_quiet_hours():
     assert len([step for step in steps if step >= 5400]) >= 3
 
 
+def test_it_leaves_a_room_that_it_stays_out_of_though_hours_are_quiet():
+    content = home_with(
+        [hangout(no_stops_in=["bedroom"], quiet="06:00-09:00")], "1 h", **belief(bathroom_1=1)
+    )
+    content["robots"]["astro"]["start"] = [1.0, 6.0]
+    stored = assert_same_for_every_max_span(content, 61)
+    assert "bedroom_1" not in rooms(stored, 60)
+    assert 1 == len(rooms(stored, 60))
+    elsewhere = home_with([hangout(quiet="06:00-09:00")], "1 h", **belief(bathroom_1=1))
+    assert [] == names(run(elsewhere))
+
+
 def test_called_away_it_goes_back_to_its_place_without_deciding_again():
     visits = [{"at": "07:15", "place": "living_room", "dwell": "2 min"}]
     behaviors = [{"type": "scheduled", "visits": visits}, hangout(period="1 h")]

@@ -13,7 +13,7 @@ from tests.thorough import some
 import fleet2d
 from fleet2d import Algorithm
 from fleet2d.algorithms.algorithm import RoomDistribution
-from fleet2d.entities.robots.interact import RoundMemory
+from fleet2d.entities.robots.interact import Interact, RoundMemory
 from fleet2d.errors import ScenarioError
 from fleet2d.interactions.answers import Answers, Reply
 from fleet2d.interactions.interaction import Outcome
@@ -114,6 +114,20 @@ def test_a_deferred_reminder_comes_back_at_its_time():
     assert ["asks", "deferred", "asks", "accepted"] == [event for _, event in happened]
     deferred, again = happened[1][0], happened[2][0]
     assert 12 * 60 <= again - deferred < 12 * 60 + 120
+
+
+def test_who_has_moved_is_asked_again():
+    items = [
+        {"at": "00:10", "place": "bedroom", "activity": "sleep"},
+        {"at": "07:40", "place": "kitchen", "activity": "breakfast"},
+    ]
+    person = ana() | {"days": [{"on": "daily", "items": items}]}
+    person["answers"] = Scripted(outcomes=("", "accepted"))
+    run = fleet2d.run(home(users={"ana": person}))
+
+    happened = events_of(run, "asks", "accepted")
+    assert ["asks", "asks", "accepted"] == [event for _, event in happened]
+    assert happened[0][0] < 40 * 60 < happened[1][0]
 
 
 def test_a_banned_room_stays_empty():
@@ -236,6 +250,30 @@ def test_who_is_out_is_looked_for_less_and_less_often():
     assert [30, 97, 120, 120] == pytest.approx(pauses[pauses > 5].tolist(), abs=3)
 
 
+def test_who_gave_no_answer_is_not_looked_for_within_four_hours():
+    rounds = []
+
+    class Watched(Interact):
+        """Notes when it begins a round."""
+
+        def decide(self, now):
+            plan = super().decide(now)
+            if plan is not None and "user_seen" in plan.interrupts and not now.events:
+                rounds.append(now.step)
+            return plan
+
+    content = home(
+        "6 h",
+        users={"ana": ana("bedroom", ("",))},
+        robots={"astro": {"behaviors": [Watched(), {"type": "patrol", "dwell": "1 min"}]}},
+        interactions={"pill": {**PILL, "within": "5 h", "retry": "1 min", "tries": 9}},
+    )
+    ((asked, _),) = events_of(fleet2d.run(content), "asks")
+
+    assert not [step for step in rounds if asked < step < asked + 4 * 3600]
+    assert [step for step in rounds if step > asked]
+
+
 OUT = {"type": "schedule", "days": [{"items": [{"at": "00:10", "away": True}]}]}
 MONDAY = datetime(2026, 1, 5, 10)
 
@@ -261,3 +299,28 @@ def test_rounds_of_an_hour_are_remembered_by_kind_of_day_and_forgotten_in_weeks(
     assert 0.33 == pytest.approx(chance(days=4), abs=0.02)
     assert 0.8 == chance(days=4, hours=1) == chance(days=5)
     assert 0.75 < chance(days=70) < 0.8
+
+
+def test_sightings_wake_nobody_who_wants_nothing():
+    asked = []
+
+    class Watched(Interact):
+        """Notes when it is asked."""
+
+        def decide(self, now):
+            asked.append(now.step)
+            return super().decide(now)
+
+    behaviors = [Watched(), {"type": "patrol", "dwell": "10 s"}]
+    run = fleet2d.run(home(robots={"astro": {"behaviors": behaviors}}))
+    (delivered,) = events_of(run, "delivered")
+    seen = [step for step, _ in events_of(run, "user_seen")]
+    ends = [step for step, _ in events_of(run, "visits")]
+
+    assert sum(step > delivered[0] for step in seen) > 10
+    assert not {step + 1 for step in seen if step > delivered[0] + 5} & set(asked) - set(ends)
+
+
+def test_interact_without_requests_is_refused():
+    with pytest.raises(ScenarioError, match="write a section `interactions`"):
+        fleet2d.run(home(interactions={}))

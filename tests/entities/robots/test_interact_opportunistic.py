@@ -51,6 +51,16 @@ def test_whom_it_does_not_want_and_what_chance_it_misses_change_nothing():
         assert np.array_equal(alone.heading, other.heading)
 
 
+def test_a_cooldown_holds_for_everybody():
+    first = {"type": "opportunistic", "again": 0, "cooldown": "30 min"}
+    stored = assert_same_for_every_max_span(home_with([first, PATROL], "2 h"), 61)
+    steps = [step for step, name, _ in events(stored) if name == "approaches"]
+    over = [step for step, name, _ in events(stored) if name == "interaction_over"]
+    assert len(steps) >= 3
+    for ended, begun in zip(over, steps[1:], strict=False):
+        assert begun - ended >= 1800
+
+
 @pytest.mark.parametrize(
     ("fields", "words"),
     [

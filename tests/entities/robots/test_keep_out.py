@@ -59,6 +59,11 @@ def test_no_behavior_enters(behavior):
     assert not {"kitchen_1", "bathroom_1"} & set(rooms_of(lived_in(behavior, ["kitchen"])))
 
 
+@pytest.mark.parametrize("behavior", ["patrol", "find", "follow", "explore"])
+def test_behaviors_enter_a_room_that_is_not_forbidden(behavior):
+    assert "kitchen_1" in rooms_of(lived_in(behavior, []))
+
+
 @pytest.mark.slow
 def test_the_family_s_robot_enters_neither_bedrooms_nor_bathrooms_in_a_week():
     week = fleet2d.run("bundled:family", "simulation.duration=7 d", seed=1)
@@ -67,6 +72,12 @@ def test_the_family_s_robot_enters_neither_bedrooms_nor_bathrooms_in_a_week():
     assert not {"bedroom", "bathroom"} & visited
     assert {"kitchen", "living_room", "entryway"} <= visited
     assert week.metrics["interactions"]
+
+
+@pytest.mark.parametrize("keep_out", [["bedroom"], ["bedroom_1"]])
+def test_rooms_are_given_by_kind_or_name(keep_out):
+    visited = set(rooms_of(run(flat(keep_out=keep_out))))
+    assert {"living_room_1", "kitchen_1", "bathroom_1"} == visited - {DOORWAYS}
 
 
 @pytest.mark.parametrize(
@@ -194,6 +205,14 @@ def test_it_never_enters_a_drawn_area():
         way = path(run_, "astro")
         beside = np.maximum(np.abs(way.x - 2.5) - 0.5, np.abs(way.y - 3.35) - 0.55)
         assert enters == (beside < grown).any()
+
+
+def test_put_into_an_area_it_leaves():
+    script = [{"at": "07:10", "put": "astro", "to": [2.5, 3.4]}]
+    way = path(run(flat(keep_out=[{"area": AREA}], script=script)), "astro")
+    inside = (way.x > 2) & (way.x < 3) & (way.y > 2.8) & (way.y < 3.9)
+    assert inside[600]
+    assert not inside[615:].any()
 
 
 def test_it_may_pass_a_room_without_stops():

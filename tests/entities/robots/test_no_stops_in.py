@@ -5,6 +5,7 @@ from tests.scenes import DOORS, scenario, table, write_flat
 
 import fleet2d
 from fleet2d.errors import PlacementError, ScenarioError
+from fleet2d.floorplan.load import load_floorplan
 from fleet2d.interventions import Call
 
 CAMERA = {"range": [0.2, 6], "angle_deg": 340}
@@ -99,3 +100,16 @@ def test_a_visit_in_a_room_to_avoid_is_left_out_with_a_note():
     note = "scheduled.visits: left out, because of `no_stops_in`: those of kitchen_1"
     assert [note] == simulation.actors["astro"].notes
     assert ["bedroom_1"] == table(simulation.run(), "events", event="visits")["detail"].tolist()
+
+
+def test_a_path_is_retraced_but_for_its_part_in_rooms_to_avoid(shared_data):
+    file = shared_data / "valetudo" / "dreame_z10_named_rooms_and_paths.json"
+
+    def points(avoid):
+        robot = {"behaviors": [{"type": "retrace", "path": str(file), "no_stops_in": avoid}]}
+        content = scenario(robots={"astro": robot})
+        content["floorplan"] = {"type": "valetudo", "path": str(file)}
+        return int(table(fleet2d.run(content), "events", event="retraces")["detail"][0].split()[0])
+
+    kinds = sorted({room.type for room in load_floorplan(file).rooms})
+    assert points([kinds[0]]) < points([])

@@ -9,6 +9,8 @@ from tests.scenes import path, run, scenario
 import fleet2d
 from fleet2d.errors import InputError
 
+REACHABLE = ["living_room_1", "kitchen_1", "bedroom_1", "bathroom_1"]
+
 
 def patrol(duration="1 h", **fields):
     robot = {
@@ -47,6 +49,18 @@ def test_it_stops_in_every_room_in_turn_for_the_dwell():
         assert 60 <= count <= 62, (x, y)
 
 
+def test_all_rooms_are_those_that_it_can_enter():
+    names = room_names(run(patrol()))
+    assert set(REACHABLE) <= set(names) <= {*REACHABLE, "unknown_1"}
+    assert names[: len(set(names))] == sorted(set(names), key=names.index)
+
+
+def test_it_stands_at_the_middle_of_a_room():
+    stored = run(patrol("10 min", rooms=["bedroom"]))
+    (x, y), *_ = [place[:2] for place in stops(stored)]
+    assert (x, y) == pytest.approx(stored.plan.room("bedroom_1").anchor_xy, abs=0.1)
+
+
 def test_waypoints_are_met_exactly():
     points = [(1.0, 1.0), (7.0, 1.0), (7.0, 6.0)]
     places = [place[:2] for place in stops(run(patrol(waypoints=points, look_around=False)))]
@@ -79,6 +93,11 @@ def test_random_order_visits_all_in_each_round_in_changing_order():
     assert len({tuple(r) for r in rounds}) > 5
 
 
+def test_a_room_named_twice_is_visited_once_a_round():
+    names = room_names(run(patrol(rooms=["kitchen", ["kitchen_1", "any"], "bedroom"])))
+    assert ["kitchen_1", "bedroom_1"] * 2 == names[:4]
+
+
 def bent(**fields):
     """A synthetic home in which a part of a bedroom is out of view from the middle of it."""
     return {
@@ -99,6 +118,12 @@ def test_a_patrol_says_which_places_it_never_sees_and_stops_where_it_does():
     by_view = fleet2d.Simulation(bent(stop_at="view")).actors["astro"]
     assert [] == by_view.notes
     assert len(by_view.behaviors[0].stops) >= len(by_middle.behaviors[0].stops)
+
+
+def test_a_robot_that_also_does_something_else_is_not_warned():
+    content = bent()
+    content["robots"]["astro"]["behaviors"].append({"type": "hangout"})
+    assert [] == fleet2d.Simulation(content).actors["astro"].notes
 
 
 def test_a_round_that_takes_no_time_does_not_hang_the_run():

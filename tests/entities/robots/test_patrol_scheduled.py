@@ -1,5 +1,7 @@
 """Scheduled: visits at times of the day, between which others have their way."""
 
+from itertools import pairwise
+
 import pytest
 from tests.entities.robots.robots import assert_same_for_every_max_span, events, home_with, rooms
 from tests.scenes import run
@@ -25,6 +27,13 @@ def test_visits_are_made_at_their_times_and_days():
     assert ["living_room_1", "kitchen_1", "living_room_1", "bedroom_1", "living_room_1"] == rooms(
         stored
     )
+
+
+def test_visits_are_made_anew_every_day():
+    stored = run(home_with([{"type": "scheduled", "visits": VISITS[:1]}, REST], "3 d"))
+    steps = [step for step, name, _ in events(stored) if name == "visits"]
+    assert 3 == len(steps)
+    assert {86400} == {b - a for a, b in pairwise(steps)}
 
 
 def test_who_may_not_break_in_waits_and_leaves_out_what_is_too_late():

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from tests.entities.robots.robots import (
     OUT,
+    assert_same_for_every_max_span,
+    events,
     home_with,
     names,
 )
@@ -16,6 +18,7 @@ from fleet2d import Simulation
 from fleet2d.engine.access import run_until_asked, situation_of
 from fleet2d.entities.robots.policy import COLUMNS, Policy, SightingMemory
 from fleet2d.errors import ComponentError, InputError
+from fleet2d.interventions import Send
 from fleet2d.kernels import SUB, SightingColumn
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.local_time import zone_of
@@ -66,6 +69,16 @@ def lives(content, choose):
     return simulation, observations
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["hangout", "find", "patrol"])
+def test_a_run_with_a_policy_is_the_same_for_every_max_span(task):
+    stored = assert_same_for_every_max_span(home_with([policy(task, every="20 min")], "90 min"))
+
+    assert {"hangout": "relocates", "find": "find_begins", "patrol": "visits"}[task] in names(
+        stored
+    )
+
+
 @pytest.mark.parametrize("task", ["hangout", "find", "patrol"])
 def test_actions_from_outside_repeat_the_run_of_the_policy(task):
     content = home_with([policy(task, every="20 min")], "90 min")
@@ -113,6 +126,15 @@ def test_observation_describes_the_home_and_pads_it():
     assert 1 == table[plan.room("kitchen_1").index, AT["is_kitchen"]]
     assert pytest.approx(1) == table[:, AT["area"]].sum()
     assert np.abs(table).max() <= 1
+
+
+def test_rooms_without_a_way_are_masked_and_rest_is_always_possible():
+    masks = []
+    lives(home_with([policy()], "30 min"), lambda _, __, mask: masks.append(mask) or 16)
+    storage = Simulation(home_with([policy()])).home.plan.room("storage_1").index
+
+    expected = [n < 6 and n != storage for n in range(16)]
+    assert [*expected, True] == masks[0].tolist()
 
 
 @pytest.mark.parametrize(
@@ -169,6 +191,14 @@ def test_who_was_interrupted_close_to_a_corner_may_still_go_to_all_rooms():
     assert free.tolist() == behavior.poses.ways(17).mask.tolist()
 
 
+def test_last_action_of_a_search_gives_it_up():
+    content = home_with([fixed(16, task="find", every="20 min")], "30 min", ana=OUT)
+
+    assert [(0, "find_begins"), (0, "gave_up"), (1200, "find_begins"), (1200, "gave_up")] == [
+        (step, event) for step, event, _ in events(run(content))
+    ]
+
+
 @pytest.mark.parametrize(("chosen", "is_empty"), [(None, True), (16, False)])
 def test_empty_battery_ends_all_decisions_and_rest_charges(chosen, is_empty):
     battery = {"driving": "10 min", "standing": "1 h", "charging": "30 min", "charger": "kitchen"}
@@ -178,6 +208,29 @@ def test_empty_battery_ends_all_decisions_and_rest_charges(chosen, is_empty):
 
     assert is_empty == simulation.actors["astro"].charge.is_empty
     assert is_empty == (min(table[0, AT["charge"]] for table in tables) < 0.9)
+
+
+def test_order_is_carried_out_without_asking_the_policy():
+    simulation = Simulation(home_with([policy()], "1 h"))
+    simulation.do(Send("astro", "bedroom", duration="30 min"))
+
+    assert ["astro"] == run_until_asked(simulation, "astro")
+    assert simulation.step >= 1800
+
+
+def test_a_robot_that_was_off_remembers_no_sightings():
+    act = {"at": "08:00", "power": "astro", "state": "crash"}
+    content = home_with([policy()], "3 h")
+    content["script"] = [act]
+    assert_same_for_every_max_span(content, 61)
+    simulation = Simulation(content)
+    simulation.run_until("08:02")
+    memory = simulation.actors["astro"].recall()
+    last = int(memory.rooms[0].max())
+    assert last < 0 or last >= 3660
+    simulation.run()
+    assert memory is simulation.actors["astro"].recall()
+    assert int(memory.rooms[0].max()) > 3660
 
 
 def test_memory_counts_looks_by_the_hour_that_the_clock_reads():

@@ -1,8 +1,10 @@
 """Population: what many people do at each hour is what the survey found."""
 
+import copy
 import statistics
 from collections import Counter
 from datetime import date
+from itertools import pairwise
 
 import pytest
 from tests.routines.days import MONDAY
@@ -51,6 +53,16 @@ def test_shares_of_many_people_follow_the_survey_hour_by_hour():
     assert max(distances) < 0.10
 
 
+def test_days_follow_each_other_without_a_gap():
+    actor = Simulation(scenario("5 min", users=users(1))).actors["user_0"]
+    days = [actor.behaviors[0].day(MONDAY + i) for i in range(20)]
+    for day, after in pairwise(days):
+        assert all(one.end == other.begin for one, other in pairwise(day))
+        assert all(episode.begin < episode.end for episode in day)
+        assert (4 * HOUR, 28 * HOUR) == (day[0].begin, day[-1].end)
+        assert 4 * HOUR == after[0].begin
+
+
 def test_hardly_a_day_of_the_retired_has_no_meal_at_home():
     """Without what the survey doesn't record, as eating in front of the television, 29 % had none."""
     simulation = Simulation(scenario("5 min", users=users(40, group="retired")))
@@ -64,6 +76,15 @@ def test_hardly_a_day_of_the_retired_has_no_meal_at_home():
     ]
     assert meals.count(0) < 0.06 * len(meals)
     assert 2 < statistics.mean(meals) < 3
+
+
+def test_asking_for_a_day_again_or_from_a_branch_gives_the_same():
+    simulation = Simulation(scenario("5 min", users=users(1)))
+    behavior = simulation.actors["user_0"].behaviors[0]
+    third = behavior.day(MONDAY + 3)
+    assert third == copy.deepcopy(simulation).actors["user_0"].behaviors[0].day(MONDAY + 3)
+    behavior.day(MONDAY + 9)
+    assert third == behavior.day(MONDAY + 3)
 
 
 def test_a_group_that_is_none_is_refused():

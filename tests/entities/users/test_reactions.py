@@ -1,11 +1,15 @@
 """Reactions: what people do about robots, and that nothing happens where nobody asked for them."""
 
+import copy
+
 import numpy as np
 import pytest
 from tests.scenes import OWN, digests, path, run, scenario, table
 from tests.thorough import THOROUGH
 
+import fleet2d
 from fleet2d.engine.simulation import Simulation
+from fleet2d.errors import InputError
 from fleet2d.routines.persona import bundled_persona
 
 NEVER = {"turns": 0, "steps_aside": 0, "leaves": 0, "comes": 0}
@@ -47,6 +51,11 @@ def test_a_robot_behind_a_wall_is_not_noticed():
     assert [] == reacts(stored)
 
 
+def test_a_robot_that_comes_again_is_noticed_again():
+    stored = run(meets([[5.5, 2.0], 5, FAR_OFF, [5.5, 2.0], 60], turns=1, looks="2 s"))
+    assert ["turns to astro"] * 2 == reacts(stored)
+
+
 def test_who_is_in_the_way_steps_aside():
     stored = run(meets([[7.5, 2.0], 60], steps_aside=1))
     assert ["steps aside for astro"] == reacts(stored)
@@ -86,6 +95,11 @@ def test_out_of_hearing_nobody_comes():
     assert [] == reacts(run(meets([10, "call", 60], comes=1, hears=2.0)))
 
 
+def test_who_comes_is_not_stopped_by_noticing_the_robot():
+    stored = run(meets([10, "call", 200], comes=1, comes_for="1 min", turns=1))
+    assert ["comes to astro"] == reacts(stored)
+
+
 def family(**manners):
     """People of all kinds who react, in a furnished home with a robot on its rounds."""
     reactions = {"type": "reactions", "manners": manners} if manners else {"type": "reactions"}
@@ -121,6 +135,29 @@ def test_who_never_reacts_lives_as_if_there_was_no_such_behavior():
     assert digests(run(without)) == digests(run(family(**NEVER)))
 
 
+def test_a_run_can_branch_in_the_middle_of_a_reaction():
+    content = family(turns=1, comes=1, looks="2 min")
+    whole = run(content)
+    step = int(table(whole, "events", event="reacts")["step"][0]) + 3
+    simulation = Simulation(content)
+    simulation.advance(step)
+    twin = copy.deepcopy(simulation)
+    assert whole.digest == simulation.run().digest == twin.run().digest
+
+
+def test_after_a_reaction_one_goes_on_with_what_one_did():
+    day = {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}
+    activity = {"needs": {}, "errands": {}, "days": {"any_day": day}}
+    content = meets(["living_room", 200], turns=1, looks="20 s", notices=6)
+    routine = {"type": "routine", "persona": activity}
+    content["users"]["ana"]["behaviors"].append(routine)
+    content["users"]["ana"]["start"] = "living_room"
+    content["simulation"]["start"] = "2026-01-05T09:00"
+    stored = run(content)
+    assert ["turns to astro"] == reacts(stored)
+    assert {"read"} == set(table(stored, "events", entity="ana", event="activity")["detail"])
+
+
 def test_who_gives_up_what_it_did_rests():
     day = {"on": "daily", "wake": "07:00", "leisure": {"read": 1}}
     activity = {"needs": {}, "errands": {}, "days": {"any_day": day}}
@@ -144,3 +181,9 @@ def test_manners_are_the_personas_unless_given():
     assert bundled_persona("child").manners == manners_of(
         "reactions", {"type": "routine", "household": household}
     )
+
+
+def test_what_are_no_manners_is_refused_in_plain_words():
+    content = meets([], turns=1.5)
+    with pytest.raises(InputError, match=r"users\.ana.*turns"):
+        fleet2d.load_scenario(content)

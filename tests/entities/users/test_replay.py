@@ -93,6 +93,18 @@ def test_the_report_says_what_was_mapped_dropped_hurried_and_is_unknown(tmp_path
     assert yielded in notes(run(replay(events(tmp_path, MORNING))))
 
 
+def test_it_walks_at_its_own_speed_where_the_log_leaves_time(tmp_path):
+    content = replay(
+        events(tmp_path, [("07:00:00", "Bedroom", ""), ("07:04:00", "Kitchen", "")]), "5 min"
+    )
+    poses = path(run(content), "ben")
+    move = np.sqrt(np.diff(poses.x) ** 2 + np.diff(poses.y) ** 2)
+    moving = np.flatnonzero(move > 0)
+    assert 0.9 < move[moving].max() < 1.001
+    assert moving[-1] + 1 in (239, 240)  # there just in time
+    assert moving[-1] - moving[0] < 40
+
+
 def test_intervals_that_abut_are_left_early_and_begin_on_time(tmp_path):
     log = adls(
         tmp_path,
@@ -112,6 +124,16 @@ def test_intervals_that_abut_are_left_early_and_begin_on_time(tmp_path):
         (at("07:20:00"), "left_home", ""),
         (at("07:25:00"), "came_home", ""),
     ] == events_named(stored, "left_home", "came_home")
+
+
+def test_who_begins_last_holds_and_what_outlasts_it_holds_again(tmp_path):
+    log = adls(
+        tmp_path, [("07:00:00", "07:30:00", "Sleeping"), ("07:10:00", "07:15:00", "Toileting")]
+    )
+    rooms = rooms_of(replay(log))
+    assert ["bedroom", "bathroom", "bathroom", "bedroom", "bedroom"] == [
+        rooms[at(clock)] for clock in ("07:09:00", "07:10:00", "07:14:30", "07:15:00", "07:29:59")
+    ]
 
 
 GAP = [("07:00:00", "Bedroom", "Sleep"), ("07:12:00", "Kitchen", "Cook")]
@@ -338,6 +360,24 @@ def test_a_gap_between_fixes_is_unknown_held_or_walked(tmp_path):
     for gaps, expected in (("hold", [1, 1, 4]), ("walk", [2.5, 3.95, 4])):
         poses = path(run(replay(log, "11 min", gaps=gaps)), "ben")
         assert expected == pytest.approx(poses.x[[302, 590, 600]].tolist(), abs=0.05)
+
+
+def test_a_frame_of_its_own_gives_the_same_life(tmp_path):
+    plain = run(replay(fixes(tmp_path, ZIGZAG), "2 min"))
+    # In feet, turned by a quarter, from another corner.
+    rows = [(t, (y - 2) / 0.3048, -(x - 1) / 0.3048) for t, x, y in ZIGZAG]
+    log = fixes(tmp_path, rows, "other.csv")
+    told_by = {"scale": 0.3048, "rotation_deg": 90, "origin": [1, 2]}
+    matches = [
+        {"log": [u, v], "plan": [x, y]}
+        for (_, u, v), (_, x, y) in zip(rows[:3], ZIGZAG[:3], strict=True)
+    ]
+    for frame in (told_by, {"matches": matches}):
+        same = run(replay(log, "2 min", frame=frame))
+        a, b = path(plain, "ben"), path(same, "ben")
+        assert a.x == pytest.approx(b.x, abs=2e-3)
+        assert a.y == pytest.approx(b.y, abs=2e-3)
+    assert any("fits its 3 matches to 0.00 m" in note for note in notes(same))
 
 
 def test_legs_too_fast_to_be_true_are_reported_and_still_on_time(tmp_path):

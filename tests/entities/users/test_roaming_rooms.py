@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import numpy as np
 import pytest
 from tests.scenes import path, run, scenario
 from tests.thorough import some
@@ -40,6 +41,19 @@ def test_time_in_each_room_tends_to_its_share_ways_included(dwell, duration, err
     realised = stay(dwell, duration)
     for room, share in SHARES.items():
         assert share == pytest.approx(realised[room], abs=error), room
+
+
+def test_stays_follow_the_law_of_dwell_times():
+    stored = sampled(
+        "12 d", dwell={"law": "fixed", "mean": "20 min"}, shares={"kitchen": 1, "bedroom": 1}
+    )
+    poses = path(stored, "ana")
+    still = (np.diff(poses.x) == 0) & (np.diff(poses.y) == 0)
+    ends = np.flatnonzero(np.diff(np.r_[0, still.astype(int), 0]))
+    stays = (ends[1::2] - ends[::2])[1:-1]
+    longest = stays[stays > 60]
+    assert 1200 == pytest.approx(np.median(longest), abs=30)
+    assert np.percentile(longest, 5) > 1000
 
 
 def test_rooms_of_a_kind_share_its_part():

@@ -1,10 +1,12 @@
 """Routine: a persona lives in a home, alone and with others."""
 
+import copy
 import itertools
 import json
 
 import numpy as np
 import pytest
+from tests.routines.days import MONDAY
 from tests.scenes import OWN, digests, path, run, scenario, table
 from tests.thorough import some
 
@@ -79,6 +81,16 @@ def test_every_table_is_the_same_for_every_max_span(span):
     assert digests(run(content)) == digests(run(content, max_span=span))
 
 
+def test_a_life_does_not_depend_on_who_else_there_is():
+    alone = lives()
+    crowd = copy.deepcopy(alone)
+    crowd["users"]["ben"] = {"type": "routine", "persona": "student"}
+    crowd["robots"] = {"astro": {"type": "patrol"}}
+    one, other = path(run(alone), "ana"), path(run(crowd), "ana")
+    assert (one.x == other.x).all()
+    assert (one.heading == other.heading).all()
+
+
 def test_it_does_what_its_day_says_when_it_says_so():
     stored = run(lives(SHORT, "3 h", simulation={"start": "2026-01-05T06:30"}))
     done = table(stored, "events", entity="ana", event="activity")["detail"]
@@ -97,6 +109,21 @@ def test_it_walks_at_the_pace_of_its_persona(pace):
     assert pace == pytest.approx(moved.max(), rel=0.04)
 
 
+def test_small_moves_can_be_switched_off():
+    still, restless = (
+        run(lives({"extends": "retired", "leisure": {"read": 1}}, "1 d", small_moves=moves))
+        for moves in (False, True)
+    )
+
+    def stirs(stored):
+        heading = path(stored, "ana").heading
+        return int((np.diff(heading) != 0).sum())
+
+    assert stirs(still) < stirs(restless)
+    details = [list(table(s, "events", event="activity")["detail"]) for s in (still, restless)]
+    assert details[0] == details[1]
+
+
 def test_an_activity_is_done_at_its_furniture_in_its_posture():
     stored = run({**lives("works_from_home", "2 d"), **HOME})
     used = table(stored, "events", event="uses")["detail"]
@@ -108,6 +135,41 @@ def test_a_couple_shares_a_bed_and_the_child_has_its_own():
     beds = {n: a.behaviors[0].venues["sleep"].seats for n, a in simulation.actors.items()}
     assert beds["ana"][0].thing == beds["ben"][0].thing != beds["cleo"][0].thing
     assert beds["ana"] != beds["ben"]
+
+
+def test_each_bathroom_is_used_by_one_at_a_time():
+    simulation = Simulation(
+        family(members={f"user_{i}": "works_outside" for i in range(4)}, couples=[])
+    )
+    actors = list(simulation.actors.values())
+    waited = {}
+    for ordinal in range(MONDAY, MONDAY + 60):
+        busy = sorted(
+            (episode.room, episode.begin, episode.end, actor.name)
+            for actor in actors
+            for episode in actor.behaviors[0].day(ordinal)
+            if episode.activity in ("wash", "shower", "toilet", "wash_hands")
+        )
+        for (room, _, end, name), (other_room, begin, _, other) in itertools.pairwise(busy):
+            if room == other_room:
+                assert end <= begin
+                waited[room] = waited.get(room, 0) + (end == begin and name != other)
+    bathrooms = {r.index for r in simulation.home.rooms if r.type == "bathroom"}
+    assert bathrooms == set(waited)  # each of the two has a queue of its own
+    assert sum(waited.values()) > 10  # or nobody was ever in the way
+
+
+def test_on_holiday_nobody_is_at_home_and_a_visitor_only_when_visiting():
+    content = family("2 d", away=[["2026-01-05T08:00", "2026-01-06T06:00"]])
+    visit = ["2026-01-05T12:00", "2026-01-05T20:00"]
+    content["users"]["eve"] = {"type": "routine", "persona": "retired", "visits": [visit]}
+    stored = run(content)
+    hour = np.arange(48 * 3600) / 3600 + 7
+    for name in FAMILY["members"]:
+        assert path(stored, name).away[(hour > 8.1) & (hour < 30)].all()
+    eve = path(stored, "eve").away
+    assert eve[(hour < 12) | (hour > 20.1)].all()
+    assert not eve[(hour > 12.01) & (hour < 13)].all()
 
 
 def test_after_another_behavior_had_its_turn_it_goes_on_with_its_day():

@@ -1,5 +1,6 @@
 """Seating: no two members of a household use the same place at furniture at the same time."""
 
+import copy
 import itertools
 from datetime import timedelta
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from tests.scenes import digests, run, scenario, table
 
+from fleet2d.engine.simulation import Simulation
 from fleet2d.entities.users.routine import _stays
 from fleet2d.routines.planner import FINISHES, INTERRUPTS, PLANNED, REST, RESUMES, Episode
 
@@ -55,6 +57,26 @@ def test_people_without_a_household_may_have_places_of_their_own(kind):
     assert on_one_place[True] < 2 * 900  # at a washbasin or a toilet
 
 
+def test_more_people_than_places_leave_nobody_on_a_place_of_another():
+    """Four retired people have one armchair; the others are on spots of the room."""
+    chair = {"type": "armchair", "at": [11.3, 4.4], "name": "armchair"}
+    home = {"type": "bundled", "furniture": [chair]}
+    names = list(EVENING["members"])
+    result = run(household(EVENING, *names, floorplan=home), seed=1)
+    used = table(result, "events", event="uses")
+    assert len(set(used["entity"][used["detail"] == "armchair"])) > 1
+    paths = [result.path(name, every=timedelta(seconds=10)) for name in names]
+    seat = [(np.hypot(p.x - 11.3, p.y - 4.4) < 0.05) & ~p.away for p in paths]
+    assert 1 == np.sum(seat, axis=0).max()
+
+
+def test_members_who_share_a_bedroom_and_are_no_couple_lie_on_places_of_their_own():
+    """The home has three bedrooms, for four: two shared a place in bed all night."""
+    names = list(EVENING["members"])
+    result = run(household(EVENING, *names, simulation={"start": "2026-01-05T20:00"}), seed=1)
+    assert 0 == seconds_on_one_place(result, *names)
+
+
 def test_order_of_users_and_length_of_spans_change_nothing():
     names = list(EVENING["members"])
     forward = run(household(EVENING, *names), seed=2)
@@ -76,6 +98,16 @@ def test_members_who_are_not_in_the_scenario_take_no_place():
     last = {"members": dict.fromkeys(("ben", "cleo", "dan", "ana"), "retired")}
     alone = run(household(last, "ana", floorplan=home), seed=1)
     assert "armchair" in table(alone, "events", event="uses", entity="ana")["detail"]
+
+
+def test_branches_and_stored_states_have_the_same_places(tmp_path):
+    simulation = Simulation(household(EVENING, *EVENING["members"]), seed=5)
+    simulation.run_until(timedelta(hours=17))
+    simulation.save(tmp_path / "state")
+    branch, stored = copy.deepcopy(simulation), Simulation.load(tmp_path / "state")
+    end = simulation.run().digest
+    assert end == branch.run().digest
+    assert end == stored.run().digest
 
 
 def at(begin, end, role=PLANNED, activity="tv"):

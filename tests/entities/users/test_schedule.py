@@ -4,7 +4,7 @@ from datetime import datetime
 
 import numpy as np
 import pytest
-from tests.scenes import each_step, path, run, scenario, table
+from tests.scenes import ENTRANCE, OWN, each_step, path, run, scenario, table
 
 import fleet2d
 from fleet2d.errors import InputError
@@ -75,6 +75,20 @@ def test_after_a_dwell_with_nothing_due_it_rests(morning):
     assert {"living_room_1"} == set(rooms(morning)[step_of("07:17") : step_of("07:30")])
 
 
+def test_away_and_back_is_at_one_and_the_same_place(morning):
+    poses = path(morning, "ana")
+    gone = np.flatnonzero(poses.away)
+    assert gone[-1] == step_of("07:45:30") - 1
+    assert step_of("07:30") < gone[0] < step_of("07:30:30")
+    assert len(gone) == gone[-1] - gone[0] + 1
+    before, back = gone[0] - 1, gone[-1] + 1
+    assert (poses.x[back], poses.y[back]) == (poses.x[gone[0]], poses.y[gone[0]])
+    assert (poses.x[back], poses.y[back]) == pytest.approx(ENTRANCE, abs=0.1)
+    assert (poses.x[before], poses.y[before]) == pytest.approx(
+        (poses.x[back], poses.y[back]), abs=1.0
+    )
+
+
 def test_events_tell_leaving_coming_home_and_activities_at_their_steps(morning):
     events = table(morning, "events", entity="ana")
     step_of_detail = dict(zip(events["detail"], events["step"], strict=True))
@@ -123,6 +137,30 @@ def test_agendas_hold_on_their_days(start, room):
         duration="1 min",
     )
     assert room == fleet2d.Simulation(content).state["ana"]["room"]
+
+
+def test_the_agenda_of_the_next_day_follows_at_midnight():
+    stored = run(
+        one(
+            agenda({"at": "06:00", "place": "kitchen"}, on=["monday", "wednesday"]),
+            agenda(
+                {"at": "00:00", "place": "bedroom"},
+                {"at": "12:00", "place": "bathroom"},
+                on="tuesday",
+            ),
+            duration="3 d",
+            simulation={"step": "1 min"},
+        )
+    )
+    names = rooms(stored)
+
+    def at(day, hour):
+        return names[(day * 24 + hour - 7) * 60]
+
+    assert ["kitchen_1", "kitchen_1"] == [at(0, 7), at(0, 23)]
+    assert "kitchen_1" == at(1, 0)  # it sets out then
+    assert ["bedroom_1", "bedroom_1", "bathroom_1"] == [at(1, 1), at(1, 12), at(1, 13)]
+    assert ["bathroom_1", "kitchen_1"] == [at(2, 6), at(2, 7)]
 
 
 @pytest.mark.parametrize(
@@ -207,6 +245,35 @@ def test_an_agenda_that_later_ones_replace_on_each_of_its_days_is_refused():
         fleet2d.load_scenario(content)
 
 
+def test_after_another_behavior_had_its_turn_it_goes_where_it_should_be_now():
+    schedule = {"type": "schedule", "days": [agenda({"at": "06:00", "place": "kitchen"})]}
+    detour = {"type": f"{OWN}:Scripted", "script": ["bedroom", 60]}
+    content = scenario(
+        "10 min", users={"ana": {"start": "bathroom", "behaviors": [detour, schedule]}}
+    )
+    names = rooms(run(content))
+    assert "bedroom_1" in names
+    assert "kitchen_1" == names[-1]
+
+
+def test_it_does_not_move_when_it_begins_where_it_should_be():
+    stored = run(one(agenda({"at": "06:00", "place": "kitchen"}), duration="30 min"))
+    poses = path(stored, "ana")
+    assert 1 == len(
+        set(zip(poses.x.tolist(), poses.y.tolist(), poses.heading.tolist(), strict=True))
+    )
+
+
+def test_a_room_is_entered_at_another_spot_each_time():
+    items = [
+        {"at": f"07:{minute:02}", "place": ("kitchen", "bathroom")[minute % 4 // 2]}
+        for minute in range(0, 60, 2)
+    ]
+    poses = path(run(one(agenda(*items))), "ana")
+    spots = {(poses.x[k], poses.y[k]) for k in range(119, 3600, 120)}
+    assert 30 == len(spots)
+
+
 def test_a_run_may_begin_away():
     items = {"at": "06:00", "away": True}, {"at": "07:10", "place": "kitchen"}
     columns = each_step(one(agenda(*items), duration="30 min"), "ana")
@@ -247,6 +314,19 @@ def test_items_that_do_not_make_a_day_are_refused(items, words):
         fleet2d.load_scenario(one(agenda(*items)))
     for word in ["users.ana.days.0", *words]:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("on", ["moonday", ["weekdays", "holidays"], []])
+def test_days_that_are_none_are_refused(on):
+    with pytest.raises(InputError, match="on"):
+        fleet2d.load_scenario(one(agenda({"at": "08:00", "place": "kitchen"}, on=on)))
+
+
+def test_an_unreachable_room_is_refused_before_the_run():
+    item = {"at": "08:00", "place": "storage_1", "dwell": "1 h"}
+    with pytest.raises(InputError, match=r"schedule\.days.*storage_1") as caught:
+        fleet2d.Simulation(one(agenda(item), start="kitchen"))
+    assert "users.ana" in str(caught.value)
 
 
 def test_time_is_told_to_the_step_when_the_run_begins_within_a_minute():
