@@ -244,6 +244,13 @@ def test_a_simulated_clock_may_begin_at_zero(ros, tmp_path):
     assert (None, 0, 9 * 10**6) == (log.first_day, log.time_us[0], log.time_us[-1])
 
 
+def test_bag_without_poses_lists_its_topics(tmp_path):
+    ros = Ros(2)
+    row = ("/chatter", "std_msgs/msg/String", NINE, ros.new("std_msgs/msg/String", "hello"))
+    with pytest.raises(LogError, match="no poses: no odometry, poses or /tf among /chatter"):
+        read_log(ros.bag(tmp_path / "bag", [row]))
+
+
 def test_stamps_that_run_backwards_are_sorted_if_asked(ros, tmp_path):
     log = read(ros, tmp_path, backwards(ros), sort=True)
 

@@ -33,6 +33,28 @@ def test_a_table_keeps_all_detections_of_an_instant(tmp_path):
     assert log.days == 1
 
 
+def test_json_lines_and_parquet_hold_the_same_as_csv(tmp_path):
+    import pyarrow.csv as pacsv
+    import pyarrow.parquet as pq
+
+    path = write(tmp_path, ROWS)
+    table = pacsv.read_csv(path)
+    pq.write_table(table, tmp_path / "seen.parquet")
+    lines = [
+        '{"time": "2026-03-01 08:00:00", "label": "ana", "x": 1.0, "y": 2.0}',
+        '{"time": "2026-03-01 08:00:00", "label": "ben", "x": 1.5, "y": 2.5}',
+        '{"time": "2026-03-01 08:00:02", "label": null, "x": 1.1, "y": 2.1}',
+    ]
+    write(tmp_path, "\n".join(lines), "seen.jsonl")
+
+    logs = [read_detections(tmp_path / f"seen.{suffix}") for suffix in ("csv", "parquet", "jsonl")]
+
+    for log in logs[1:]:
+        assert np.array_equal(log.time_us, logs[0].time_us)
+        assert np.array_equal(log.xy, logs[0].xy)
+        assert log.label.tolist() == logs[0].label.tolist()
+
+
 def test_columns_are_named_by_the_scenario(tmp_path):
     path = write(tmp_path, "when,face,east,north\n0,f7,1,2\n5,f9,3,4\n")
     names = {"time": "when", "user": "face", "x": "east", "y": "north"}

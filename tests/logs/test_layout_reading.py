@@ -1,6 +1,8 @@
 """Logs of all layouts: what is read, and what is refused with the line that is wrong."""
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
 import pytest
 
 from fleet2d.logs.layout import read_log
@@ -83,6 +85,11 @@ def test_uci_adl_joins_both_files_of_a_home_whichever_is_named(tmp_path, named):
         ("Entrance", "Leaving", 9 * H, 9 * H + 5 * S),
         ("away", "Leaving", 9 * H, 10 * H),
     ] == [(r.room, r.activity, r.begin_us, r.end_us) for r in log.readings]
+
+
+def test_uci_adl_of_activities_alone_takes_them_for_rooms(tmp_path):
+    log = activity_log(write(tmp_path, "adl.txt", ADLS))
+    assert ["Sleeping", "Breakfast", "away"] == [r.room for r in log.readings]
 
 
 def test_homer_finds_the_room_of_things_by_their_numbers_and_sleeps_into_the_next_day(tmp_path):
@@ -168,6 +175,16 @@ def test_positions_of_one_tag_with_headings_in_degrees(tmp_path):
     assert ("1 fixes of other ids were left out",) == log.notes
 
 
+def test_summer_time_ends_the_repeated_hour_is_left_out_and_begins_with_an_hour_missing(tmp_path):
+    autumn = [f"2020-10-25T0{h}:30:00Z,1,2" for h in range(4)]  # 02:30, 02:30 again, 03:30, 04:30
+    log = position_log(csv(tmp_path, "time,x,y\n" + "\n".join(autumn)), time_zone="Europe/Berlin")
+    assert [2.5, 3.5, 4.5] == (log.time_us / H).tolist()
+    assert "1 fixes of the hour that the end of summer time repeats" in log.notes[0]
+    spring = [f"2020-03-29T0{h}:30:00Z,1,2" for h in range(2)]
+    log = position_log(csv(tmp_path, "time,x,y\n" + "\n".join(spring)), time_zone="Europe/Berlin")
+    assert [1.5, 3.5] == (log.time_us / H).tolist()
+
+
 def test_drop_outs_and_equal_times_are_left_out_and_counted(tmp_path):
     log = position_log(csv(tmp_path, "time,x,y\n1,1,1\n2,,\n3,2,2\n3,4,4\n"))
     assert [[1, 1], [4, 4]] == log.xy.tolist()
@@ -202,3 +219,10 @@ def test_damaged_positions_are_refused_with_what_to_do(tmp_path, text, settings,
 def test_settings_of_positions_are_refused_for_other_layouts(tmp_path):
     with pytest.raises(LogError, match="takes no time_zone: that is for positions"):
         read_log(write(tmp_path, "a.txt", CASAS), time_zone="UTC")
+
+
+def test_a_csv_written_by_arrow_reads_back(tmp_path):
+    times = pa.array([1583132400 * S, 1583132401 * S], pa.timestamp("us"))
+    pacsv.write_csv(pa.table({"time": times, "x": [1.5, 2.5], "y": [0, 1]}), tmp_path / "a.csv")
+    log = position_log(tmp_path / "a.csv")
+    assert [[1.5, 0], [2.5, 1]] == log.xy.tolist()

@@ -446,3 +446,11 @@ def test_labels_are_taken_for_the_rooms_that_their_words_name(label, room):
 def test_labels_without_such_words_are_asked_for(label):
     with pytest.raises(LogError, match="no room of this home stands for"):
         map_rooms({label: 1}, {}, fleet2d.load_floorplan().rooms)
+
+
+@pytest.mark.parametrize(("home", "days", "absences"), [("A", 28, 33), ("C", 20, 47)])
+def test_real_homes_of_kasteren_are_read_whole(shared_data, home, days, absences):
+    log = read_log(shared_data / "activity" / "kasteren" / f"kast_house{home}-ss.txt")
+    assert isinstance(log, ActivityLog)
+    assert (log.days, log.rooms[AWAY]) == (days, absences)
+    assert {"sleeping", "take-shower", "prep-dinner"} <= {r.activity for r in log.readings}

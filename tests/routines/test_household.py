@@ -86,6 +86,11 @@ def test_some_of_those_at_leisure_come_to_the_door_and_so_does_who_comes_home():
     assert came / 2 < welcomed  # who comes home goes to the bathroom first at times
 
 
+def test_nobody_comes_to_the_door_unless_asked_for():
+    day = lives().day(MONDAY)
+    assert all(episode.activity != WELCOME for episodes in day.values() for episode in episodes)
+
+
 def test_members_are_away_on_trips_and_visitors_outside_their_visits():
     home = lives(
         trips={"ana": [["2026-01-06", "2026-01-08T12:00"]]},

@@ -10,7 +10,7 @@ from tests.scenes import run, scenario
 
 from fleet2d.routines.household import AWAY, Household
 from fleet2d.routines.life import FOREVER, Life, Lives, Year
-from fleet2d.routines.persona import Persona, read_persona
+from fleet2d.routines.persona import Persona, bundled_days, read_persona
 
 HOUR = 3600
 NEW_YEAR = date(2026, 1, 1).toordinal()
@@ -63,6 +63,24 @@ def test_heat_comes_by_chance_and_begins_in_its_season_only():
     assert all("06-01" <= day(first)[5:] <= "08-31" for first, _ in found)
     assert set(found) == {s for s in anytime if "06-01" <= day(s[0])[5:] <= "08-31"}
     assert 30 * 92 / 24 == pytest.approx(len(found), rel=0.15)
+
+
+def test_a_season_of_chance_may_last_past_new_year():
+    found = spans({**HEAT, "season": ["12-01", "01-31"]}, years=10)
+
+    assert {"12", "01"} == {day(first)[5:7] for first, _ in found}
+
+
+def test_days_of_heat_have_a_siesta_and_an_evening_outside():
+    days = {"season": ["06-01", "08-31"], "days": "hot"}
+    june = date(2026, 6, 1).toordinal()
+    lives = life(), life(heat=days)
+    cool, hot = ([e.activity for d in range(june, june + 30) for e in own.day(d)] for own in lives)
+
+    assert cool.count("sit_outside") == 0
+    assert hot.count("nap") > 15
+    assert hot.count("sit_outside") > 15
+    assert hot.count("work") == 0
 
 
 def test_a_season_may_last_past_new_year_and_end_on_a_leap_day():
@@ -198,3 +216,26 @@ def test_what_is_no_event_is_refused(event, message):
     pytest.importorskip("holidays")
     with pytest.raises(ValidationError, match=message):
         persona(event=event)
+
+
+def test_a_household_becomes_nobody_else_and_names_templates_of_its_members():
+    for event, message in (
+        ({"once": "2026-01-01", "becomes": "retired"}, "only a member"),
+        ({"once": "2026-01-01", "days": "weekday"}, "did you mean 'weekdays'"),
+    ):
+        with pytest.raises(ValidationError, match=message):
+            Household.model_validate({"members": {"ana": "works_outside"}, "year": {"x": event}})
+
+
+def test_a_night_too_short_before_an_event_is_refused():
+    with pytest.raises(ValidationError, match="too short a night"):
+        persona("night_shift", flu=FLU)
+
+
+def test_every_bundled_template_can_follow_the_days_of_who_sleeps_at_night():
+    for name in ("child", "retired", "student", "works_from_home", "works_outside"):
+        year = {day: {"every": "30 d", "lasts": "2 d", "days": day} for day in bundled_days()}
+        own = Life(persona(name, **year), 4, "users.ana")
+        for ordinal in range(MONDAY, MONDAY + 120):
+            today, after = own.day(ordinal), own.day(ordinal + 1)
+            assert today[-1].end == after[0].begin + 86_400

@@ -1,5 +1,6 @@
 """The planner: no day that it draws breaks a constraint, and they spread as they are told to."""
 
+import statistics
 from datetime import date
 from itertools import pairwise
 
@@ -40,6 +41,40 @@ def test_no_day_of_thousands_breaks_a_constraint(name):
         days = [lived.day(MONDAY + i) for i in range(341)]  # 6 personas x 340, or 10,200 days
         for i, (day, after) in enumerate(pairwise(days)):
             assert [] == violations(persona, MONDAY + i, day, after)
+
+
+def test_wake_meal_and_bed_times_spread_as_stated():
+    persona = bundled_persona("works_outside")
+    lived = life(persona)
+    days = [
+        without_interruptions(lived.day(MONDAY + 7 * w + i)) for w in range(300) for i in range(5)
+    ]
+    template = persona.days["weekdays"]
+    wakes = [day[0].begin for day in days]
+    cooking = [d.begin for day in days for d in day if d.task == "cook"]
+    beds = [day[-1].begin for day in days]
+    for times, timing in (
+        (wakes, template.wake),
+        (cooking, template.do["cook"]),
+        (beds, template.sleep),
+    ):
+        spread = timing.spread.total_seconds()
+        assert timing.at.total_seconds() == pytest.approx(statistics.mean(times), abs=0.5 * spread)
+        assert spread == pytest.approx(statistics.pstdev(times), rel=0.25)
+
+
+def test_a_day_does_not_depend_on_which_were_asked_for_before():
+    persona = bundled_persona("retired")
+    straight = life(persona)
+    days = [straight.day(MONDAY + i) for i in range(30)]
+    assert days[17] == life(persona).day(MONDAY + 17)
+
+
+def test_probability_is_the_share_of_days():
+    persona = of({"shopping": {"between": ["10:00", "18:00"], "probability": 0.3}})
+    lived = life(persona)
+    done = sum("shopping" in tasks(lived.day(MONDAY + i)) for i in range(3000))
+    assert 0.3 == pytest.approx(done / 3000, abs=0.03)
 
 
 def test_what_follows_comes_at_once_and_only_after_what_it_follows():
@@ -139,6 +174,16 @@ def test_a_template_that_is_impossible_is_refused_in_plain_words(do, words):
         of(do)
     for word in words:
         assert word in str(caught.value)
+
+
+def test_a_night_that_is_too_short_is_refused():
+    with pytest.raises(ValidationError, match="too short a night"):
+        of({}, wake="05:00", sleep={"at": "02:00", "at_least": "6 h"})
+
+
+def test_days_of_the_week_without_a_template_are_named():
+    with pytest.raises(ValidationError, match="saturday, sunday"):
+        Persona.model_validate({"days": {"work": {"on": "weekdays"}}})
 
 
 @st.composite

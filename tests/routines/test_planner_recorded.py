@@ -46,6 +46,14 @@ def test_days_have_no_gap_and_end_asleep_when_the_next_begins():
         assert day[-1].end == after[0].begin + 86_400
 
 
+def test_most_days_are_like_no_recorded_one_and_hold_nothing_else():
+    life = Life(persona(), 4, "users.ana")
+    orders = {tuple(d.activity for d in life.day(MONDAY + i)) for i in range(200)}
+    recorded = {parse_day(text).activities for text in DAYS}
+    assert len(orders - recorded) >= 3
+    assert {name for order in orders for name in order} == {n for day in recorded for n in day}
+
+
 def test_members_of_a_household_keep_out_of_each_others_bathroom():
     members = {"ana": persona(), "ben": persona()}
     lives = Lives(Household(members=members), 4, MONDAY)
@@ -54,6 +62,16 @@ def test_members_of_a_household_keep_out_of_each_others_bathroom():
         busy = sorted((d.begin, d.end) for episodes in day.values() for d in episodes
                       if d.activity == "wash")  # fmt: skip
         assert all(a[1] <= b[0] for a, b in pairwise(busy))
+
+
+def test_what_a_household_does_together_takes_the_place_of_what_would_be_done():
+    joint = {"dinner": {"at": "19:00", "spread": "0 s", "on": "daily", "takes": "40 min"}}
+    members = {"ana": persona(), "ben": persona()}
+    day = Lives(Household(members=members, together=joint), 4, MONDAY).day(MONDAY + 3)
+    dinners = {
+        (d.begin, d.end) for episodes in day.values() for d in episodes if d.task == "dinner"
+    }
+    assert 1 == len(dinners)
 
 
 @pytest.mark.parametrize(
