@@ -189,6 +189,26 @@ def test_users_are_recognized_mistaken_or_unknown_by_distance():
         check_by(distance, edges, rows[:, Column.IDENTITY] == who, share)
 
 
+def test_users_are_mistaken_like_the_confusion_matrix():
+    """No row is like a column: a transposed matrix would fail."""
+    shares = {
+        "ana": {"ben": 0.7, "cleo": 0.3},
+        "ben": {"ana": 0.1, "dora": 0.9},
+        "cleo": {"dora": 1.0},
+    }
+    users = np.concatenate([around(DISTANCE, BEARING)] * 4)
+    perception = {"identity": {"mistaken": 0.6, "confusion": shares}}
+    rows = Watch(users, perception=perception).look()
+    names = ("ana", "ben", "cleo", "dora")
+    shares["dora"] = dict.fromkeys(("ana", "ben", "cleo"), 1 / 3)
+    for u, true in enumerate(names):
+        identities = rows[rows[:, Column.USER] == u, Column.IDENTITY]
+        assert (identities >= 0).all()
+        for v, perceived in enumerate(names):
+            share = 0.4 if u == v else 0.6 * shares[true].get(perceived, 0.0)
+            assert agree(identities == v, share), (true, perceived)
+
+
 # --- Where, and how -------------------------------------------------------------------------------
 
 
