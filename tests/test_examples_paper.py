@@ -6,14 +6,17 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import polars as pl
 import pytest
 from examples.paper import reproduce as paper
 from examples.paper.reproduce import (
     ESTIMATORS,
+    NAIVE_ESTIMATOR,
     NAIVE_GUESS,
     SIZES,
     PaperOptions,
     Result,
+    differences,
     draw,
     feedback,
     ltp_gap,
@@ -109,6 +112,19 @@ def test_right_after_a_sighting_the_naive_guess_is_right_and_after_hours_is_not(
     assert top_1[NAIVE_GUESS, "0-1 min"] > 0.9
     assert top_1[NAIVE_GUESS, "over 4 h"] < 0.2
     assert top_1["hmm", "over 4 h"] > 0.5
+
+
+def test_differences_are_paired_by_seed(measured):
+    errors = pl.DataFrame(measured("feedback").numbers["tv"])
+    values = {(r["robot"], r["seed"], r["estimator"]): r["value"] for r in errors.to_dicts()}
+    robots = [*design_of(1).labels["robot"]]
+    assert robots == errors["robot"].unique(maintain_order=True).to_list()
+    less = differences(errors).to_dicts()
+    assert len(robots) * (len(ESTIMATORS) - 1) == len(less)
+    for row in less:
+        robot, seed, estimator = row["robot"], row["seed"], row["estimator"]
+        expected = values[robot, seed, estimator] - values[robot, seed, NAIVE_ESTIMATOR]
+        assert expected == row["value"]
 
 
 def design_of(seeds):

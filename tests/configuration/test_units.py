@@ -97,11 +97,14 @@ def test_duration_dumps_in_the_largest_unit_that_divides_it(written, dumped):
         ({"fortnights": 1}, "unknown unit 'fortnights' in"),
         ("fast", "expected a duration, got 'fast': write it with a unit, like '30 s'"),
         (7, "7 has no unit: write '7 d', '7 h', '7 min' or '7 s'"),
+        ("7", "7 has no unit: write '7 d', '7 h', '7 min' or '7 s'"),
         (0.5, "0.5 has no unit: write '0.5 d'"),
+        ("", "expected a duration, got ''"),
         ("5 3", "expected a duration, got '5 3'"),
         ("1 h 30", "expected a duration, got '1 h 30'"),
         (True, "expected a duration, got True"),
         (None, "expected a duration, got None"),
+        ({}, "expected a duration, got {}"),
         ({"days": "3"}, "expected a duration, got {'days': '3'}"),
         ("-1 s", "expected a duration of 0 or more, got -1 s"),
         (timedelta(-1), "expected a duration of 0 or more"),
@@ -109,6 +112,7 @@ def test_duration_dumps_in_the_largest_unit_that_divides_it(written, dumped):
         ("1e300 s", "expected a duration of at most 1000 years, got '1e300 s'"),
         (timedelta.max, "expected a duration of at most 1000 years"),
         (float("nan"), "expected a duration, a finite number, got nan"),
+        (float("inf"), "expected a duration, a finite number, got inf"),
     ],
 )  # fmt: skip
 def test_duration_says_what_is_wrong(written, said):

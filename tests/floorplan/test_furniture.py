@@ -6,7 +6,7 @@ import pytest
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.furniture import FURNITURE, furniture_type, stand_furniture
-from fleet2d.kernels import TURN
+from fleet2d.kernels import QUARTER, TURN
 
 ALL = [pytest.param(furniture, id=furniture.type) for furniture in FURNITURE.values()]
 
@@ -22,6 +22,21 @@ def test_people_stand_beside_blocking_furniture_and_not_in_it(furniture):
         else:
             assert abs(use.x) <= (x1 - x0) / 2 + 0.5
             assert abs(use.y) <= (y1 - y0) / 2 + 0.5
+
+
+@pytest.mark.parametrize(
+    ("heading", "x", "y", "facing"),
+    [
+        (0, 3.65, 2.0, math.pi),
+        (QUARTER, 3.0, 2.65, 1.5 * math.pi),
+        (2 * QUARTER, 2.35, 2.0, 0.0),
+        (3 * QUARTER, 3.0, 1.35, 0.5 * math.pi),
+    ],
+)
+def test_person_stands_before_a_stove_and_faces_it(heading, x, y, facing):
+    (use,) = stand_furniture("stove", (3.0, 2.0), heading, (0.6, 0.6)).uses
+
+    assert pytest.approx((x, y, facing)) == (use.x, use.y, use.heading)
 
 
 def test_turning_a_piece_turns_its_footprint_and_its_uses():

@@ -1,7 +1,5 @@
 """Glass is seen through and not walked through; outer windows show nothing."""
 
-from dataclasses import replace
-
 import numpy as np
 import shapely
 from hypothesis import given, settings
@@ -11,7 +9,7 @@ from tests.thorough import examples
 
 import fleet2d
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.load import load_floorplan, save_floorplan
+from fleet2d.floorplan.load import save_floorplan
 from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.doorways import DoorLine
@@ -128,14 +126,3 @@ def test_outer_windows_and_glass_off_walls_are_noted_and_change_nothing():
     assert Home(plan).barriers is Home(plan).walls
     assert any("the glass at (1.10, 1.50) m is in no wall" in note for note in plan.notes)
     assert "windows in outer walls, through which nobody is seen: 1" in plan.notes
-
-
-def test_glass_is_stored_read_and_part_of_the_content(tmp_path):
-    plan = office()
-    save_floorplan(plan, tmp_path / "own.json")
-    save_floorplan(plan, tmp_path / "plan.geojson")
-
-    assert plan == load_floorplan(tmp_path / "own.json")
-    assert replace(plan, glass=()).digest != plan.digest
-    again = load_floorplan(tmp_path / "plan.geojson")
-    assert shapely.union_all(again.glass).contains(shapely.union_all(plan.glass).buffer(-2))

@@ -127,6 +127,7 @@ def test_lives_whose_homes_are_not_as_their_rows_say_are_left_out_and_counted(tm
     [
         ("home,weigt\n0,1\n", {"weight": "weight"}, "no column 'weight': did you mean 'weigt'"),
         ("home,weight\n0,1\n1,NaN\n", {}, "row 2: the weight is nan"),
+        ("home,weight\n0,1\n1,\n", {}, "row 2: the weight is None"),
         ("home,weight\n0,-1\n", {}, "row 1: the weight is -1"),
         ("home,weight\n0,0\n1,0\n", {}, "weight of all rows is 0"),
         ("home,weight\n", {}, "has no rows"),

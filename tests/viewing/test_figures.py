@@ -23,6 +23,17 @@ def test_moment_is_drawn_in_each_format(run_dir, tmp_path, ending):
 
 
 @pytest.mark.slow
+def test_same_moment_gives_the_same_bytes_and_another_others(run_dir, tmp_path):
+    run = fleet2d.open_run(run_dir)
+    contents = []
+    for number, step in enumerate((25_000, 25_000, 30_000)):
+        target = tmp_path / f"{number}.png"
+        draw_moment(run, step, target)
+        contents.append(target.read_bytes())
+    assert contents[0] == contents[1] != contents[2]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["life", "heat", "strip"])
 def test_stretch_is_drawn_as_each_figure(run_dir, tmp_path, kind):
     target = tmp_path / f"{kind}.png"

@@ -243,6 +243,7 @@ def test_boxes_from_high_to_low_are_turned_with_a_note(tmp_path):
 # --- What is no plan ----------------------------------------------------------------------------
 
 NAN = float("nan")
+INFINITY = float("inf")
 
 
 @pytest.mark.parametrize(
@@ -251,18 +252,26 @@ NAN = float("nan")
         ({"walls": []}, "not a HouseExpo plan: it has no key `verts`"),
         ({"format": "fleet2d-floorplan"}, "Fleet2D's own format: use type native"),
         ([1, 2], "holds a list: a floor plan is a JSON object"),
+        (7, "holds a single value"),
         (None, "holds nothing"),
         ({"verts": "outline"}, 'verts is "outline": a list of points'),
+        ({"verts": {}}, "verts is {}: a list of points"),
+        ({"verts": []}, "verts has 0 different points: an outline has at least 3"),
+        ({"verts": [[0, 0], [1, 1]]}, "verts has 2 different points"),
         ({"verts": [[0, 0], [1, 1], [0, 0], [1, 1]]}, "verts has 2 different points"),
         ({"verts": [[0, 0], [1, 0, 2], [1, 1]]}, r"verts\[1\] is \[1, 0, 2\]: a list of 2 numbers"),
         ({"verts": [[0, 0], ["a", 0], [1, 1]]}, r'verts\[1\] is \["a", 0\]: "a" is not a number'),
+        ({"verts": [[0, 0], [True, 0], [1, 1]]}, r"verts\[1\] .*: true is not a number"),
+        ({"verts": [[0, 0], [None, 0], [1, 1]]}, r"verts\[1\] .*: null is not a number"),
         ({"verts": [[0, 0], [NAN, 0], [1, 1]]}, r"verts\[1\] is \[NaN, 0\]: .* finite numbers"),
+        ({"verts": [[0, 0], [INFINITY, 0], [1, 1]]}, r"verts\[1\] .* finite numbers"),
         (
             {"verts": [[0, 0], [1e300, 0], [1, 1]]},
             r"verts\[1\] .* too far out for coordinates in m",
         ),
         ({"verts": [[0, 0], [9e4, 0], [1, 1]]}, "too large for cells of 0.05 m"),
         ({"verts": [[0, 0], [1, 1], [2, 2]]}, "encloses no area"),
+        ({"verts": [[0, 0], [0.02, 0], [0.02, 0.02]]}, "holds no cell of 0.05 m"),
         ({"verts": SQUARE, "room_category": []}, r"room_category is \[\]: an object is expected"),
         (
             {"verts": SQUARE, "room_category": {"Hall": 3}},

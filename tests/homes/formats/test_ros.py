@@ -230,18 +230,6 @@ def test_grey_that_fills_furniture_is_no_floor_but_all_shades_of_a_map_of_chance
     assert "grey 211 is taken for unknown" in filled.notes[0]
 
 
-def test_unknown_grey_names_the_shade_or_takes_all_for_floor(tmp_path):
-    pixels = ROOM.copy()
-    pixels[20:26, 30:36] = 230
-
-    plain = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey="none")
-    named = read_ros(write(tmp_path, pixels, free_thresh=0.25), unknown_grey=230)
-
-    assert plain.area_m2 == pytest.approx(2.5)
-    assert not any("unknown_grey" in note for note in plain.notes)
-    assert named.area_m2 == pytest.approx(2.5 - 36 * 0.05**2)
-
-
 @pytest.mark.parametrize("ground", [255, 240, 215])
 @pytest.mark.parametrize("settings", [{}, {"unknown_grey": "none"}, {"unknown_grey": "ground"}])
 def test_ground_as_light_as_the_floor_is_refused_without_a_key_that_would_not_help(

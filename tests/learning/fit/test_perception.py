@@ -190,10 +190,13 @@ def test_tables_are_read_as_other_logs_are(tmp_path):
             GOOD | {"distance": [1] * (ROWS - 1) + [-1]},
             ["log.csv, line 61", "distance", "'-1'", "0 to 100 m"],
         ),
+        (GOOD | {"distance": ["nan"] + [1] * (ROWS - 1)}, ["log.csv, line 2", "'nan'"]),
         (GOOD | {"detected": [2] * ROWS}, ["log.csv, line 2", "detected", "'2'", "0 or 1"]),
         (GOOD | {"detected": [1] * ROWS}, ["all of 60 rows are detected", "nothing to fit"]),
+        (GOOD | {"detected": [0] * ROWS}, ["none of 60 rows"]),
         (GOOD | {"bearing": [0] * ROWS}, ["'bearing'", "bearing_deg or bearing_rad"]),
         ({k: v[:3] for k, v in GOOD.items()}, ["3 rows", "50"]),
+        (GOOD | {"distance": [1200] * ROWS}, ["log.csv, line 2", "'1200'", "0 to 100 m"]),
         (GOOD | {"bearing_deg": [3350] * ROWS}, ["log.csv, line 2", "bearing_deg", "-360 to 360"]),
         (
             GOOD | {"bearing_rad": [30] * ROWS},
