@@ -9,13 +9,8 @@ from tests.kernels.scenes import breakpoints, following
 from tests.meshed_homes import home_of
 from tests.reference import giving_way as slow
 
-from fleet2d.kernels import (
-    AsideSearch,
-    BodyInWay,
-    Distances,
-    Yielder,
-    next_stop,
-)
+from fleet2d.entities.yielder import AsideSearch, BodyInWay, Yielder
+from fleet2d.kernels import Distances, next_stop
 
 SECOND = 10**6
 NEAR = 300
