@@ -176,7 +176,9 @@ def test_two_runs_with_one_prefix_are_told(broker):
         thread.join()
 
     for bridge, notes in zip(bridges, told, strict=True):
-        assert any("another run has the prefix 'home', too: name one" in note for note in notes)
+        assert any(
+            "another run has the prefix 'home', too: give each its own" in note for note in notes
+        )
         assert bridge.counts["shared prefixes"] == 1
 
 

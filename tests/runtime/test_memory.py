@@ -122,3 +122,14 @@ print(subprocess.check_output([sys.executable, "-c", child], text=True))
 """
     peak_mb = float(subprocess.check_output([sys.executable, "-c", code], text=True))
     assert 5 < peak_mb < 200
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells the name beside the memory")
+def test_peak_memory_is_told_whatever_the_process_is_called():
+    code = """
+import ctypes
+from fleet2d.runtime.memory import peak_memory_mb
+ctypes.CDLL(None).prctl(15, "müller".encode())
+print(peak_memory_mb())
+"""
+    assert float(subprocess.check_output([sys.executable, "-c", code], text=True)) > 5

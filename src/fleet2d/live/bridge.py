@@ -296,6 +296,8 @@ class Bridge:
             with suppress(KeyboardInterrupt), _prompt_threads():
                 self._simulate()
         finally:
+            if self._later:
+                self._count("lost", "readings that were left for a next step", len(self._later))
             for note in self.notes():
                 add_note(simulation, note)
             run = simulation.finish()

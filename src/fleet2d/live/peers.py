@@ -54,7 +54,6 @@ WAIT_S = 5.0
 MAX_SENDERS = 16
 # Of more messages before a run, the last ones count; so many are kept for a broker that is gone.
 MAX_EARLY = 1000
-ADVICE = "mqtt://HOST/first and mqtt://HOST/second"
 
 
 class FunctionPeer(Peer):
@@ -424,8 +423,9 @@ class MqttPeer(Peer):
             return
         self._others.add(name)
         self._client.publish(self._meeting, self._name)
-        text = f"{self._address}: another run has the prefix {self.prefix!r}, too"
-        self._hear(PeerFault("shared prefixes", f"{text}: name one for each, as in {ADVICE}"))
+        text = f"another run has the prefix {self.prefix!r}, too: give each its own, as in"
+        advice = "mqtt://HOST/first and mqtt://HOST/second"
+        self._hear(PeerFault("shared prefixes", f"{self._address}: {text} {advice}"))
 
     def _subscribed(self, *arguments: Any) -> None:
         refused = [reason for reason in arguments[3] if reason.is_failure]

@@ -220,7 +220,8 @@ def visible_from(actor: Actor, places: I64, goals: I64) -> Bool:
     Returns:
         bool (n, m).
     """
-    dx, dy = places.T[:, :, np.newaxis] - goals.T[:, np.newaxis]
+    dx = places[:, :1] - goals[:, 0]
+    dy = places[:, 1:] - goals[:, 1]
     visible = dx * dx + dy * dy <= sight_range(actor) ** 2
     place, goal = cells_of(visible).T
     visible[visible] = pairs_in_sight(actor.home.walls, places[place], goals[goal])
