@@ -164,6 +164,14 @@ def test_what_is_wrong_is_told_and_the_body_stands(message, told):
     assert len({frame.bodies["ana"]["x"] for frame in peer.frames}) == 1
 
 
+def test_reading_that_the_end_leaves_no_step_for_is_told():
+    on, off = ({"type": "reading", "sensor": "front_door", "on": state} for state in (True, False))
+
+    _, _, bridge = bridged({29: [on, off]})
+
+    assert bridge.counts == {"received": 2, "applied": 1, "lost": 1}
+
+
 def test_a_pulse_shorter_than_a_step_is_seen():
     """Of on and off in one step a sensor had only the last state, and both were applied."""
     on, off = ({"type": "reading", "sensor": "front_door", "on": state} for state in (True, False))
