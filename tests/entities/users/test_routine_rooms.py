@@ -56,8 +56,9 @@ def test_members_of_a_household_leave_the_bathroom_before_a_short_rest():
     users = {name: {"type": "routine", "household": household} for name in household["members"]}
     stored = run(scenario("28 d", users=users, robots={}))
     rests = stored.polars("events").filter(detail="rest")
+    room_ids = {name: path(stored, name).room for name in users}
     rooms = [
-        stored.plan.rooms[path(stored, name).room[step]].type
+        stored.plan.rooms[room_ids[name][step]].type
         for name, step in rests.select("entity", "step").iter_rows()
     ]
     assert rooms.count("living_room") > 100
