@@ -55,7 +55,8 @@ class Interactions(Metric):
         "kept": "share of requests",
         **dict.fromkeys(("answered", "accepted"), "share of times asked"),
         **dict.fromkeys(("value", "missed"), "worth"),
-        **dict.fromkeys(("annoyance", "mean_annoyance", "trust"), "of 1"),
+        **dict.fromkeys(("annoyance", "mean_annoyance"), "accumulated, 0 is none"),
+        "trust": "of 1",
         "woke": "times",
     }
     least = {"": 0}

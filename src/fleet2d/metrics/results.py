@@ -53,15 +53,15 @@ def block_of(metric: str, metric_class: type[Metric], result: Any) -> ResultTabl
         subjects = measures
         measures = [()]
     rows = [ResultRow(metric, [" · ".join(subject) for subject in subjects], "")]
-    last_unit = ""
     for measure in measures:
         unit = metric_class.units.get("".join(measure), metric_class.unit)
         values = [
             _text(shown[subject + measure], unit) if subject + measure in shown else ""
             for subject in subjects
         ]
-        rows.append(ResultRow("".join(measure), values, "" if unit == last_unit else unit))
-        last_unit = unit
+        # A row for each subject has one unit: the first says it for all.
+        is_said = has_names_alone and len(rows) > 1
+        rows.append(ResultRow("".join(measure), values, "" if is_said else unit))
     return ResultTable(rows, hidden)
 
 
