@@ -319,3 +319,16 @@ def test_who_is_found_is_told_apart_from_whom_the_robot_believes_to_have_found(
     said = {name: v["holds"] for name, v in fleet2d.run(content).manifest["expectations"].items()}
     is_true = not takes_the_guest_for_her
     assert {"believes": True, "finds": is_true, "is_there": is_true} == said
+
+
+def test_who_is_seen_as_a_robot_turns_past_counts_as_found():
+    people = {"ana": {"type": "routine", "persona": "works_outside"}}
+    find = {"type": "find", "user": "ana", "every": "20 min"}
+    content = scenario(
+        "5 h",
+        users=people,
+        robots={"astro": {"behaviors": [find, {"type": "patrol", "dwell": "2 min"}]}},
+        expect={"finds": "after(events(found, astro), found(ana, by=astro))"},
+    )
+    run = fleet2d.run(content, "simulation.start=2026-01-05T17:00")
+    assert run.manifest["expectations"]["finds"]["holds"]

@@ -14,6 +14,7 @@ from fleet2d.configuration.problems import check_known, did_you_mean
 from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import (
     INFINITE,
+    WORDS,
     And,
     Expectation,
     Not,
@@ -27,7 +28,7 @@ from fleet2d.expectations.expectation import (
     shortest,
 )
 from fleet2d.expectations.signals import Scene, Signal
-from fleet2d.expectations.vocabulary import during, events
+from fleet2d.expectations.vocabulary import during, events, in_view, seen
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import I64, Bool
 from fleet2d.runtime.clock import midnight_of
@@ -274,6 +275,23 @@ class since(Windowed):
         hold, goal = (part.robustness(run, high).reversed for part in (self.hold, self.goal))
         reach = None if self.within is None else run.reach(self.within)
         return _until(hold, goal, reach, -INFINITE).reversed
+
+
+def found(body: str, by: str) -> Expectation:
+    """Return whether a robot finds a person, and not somebody else whom it takes for the person.
+
+    The search may end some steps after the sighting, when the robot has turned away already: so the
+    person must truly have been in its view since it began to count the person as seen. What the
+    robot itself believes is the event alone, `events("found", by, detail=body)`.
+
+    >>> print(found("ana", by="astro"))
+    events("found", "astro", detail="ana") and since(seen("ana", by="astro"), in_view("ana", \
+by="astro"))
+    """
+    return events(EventKind.FOUND, by, detail=body) & since(seen(body, by=by), in_view(body, by=by))
+
+
+WORDS[found.__name__] = found
 
 
 class once(Windowed):

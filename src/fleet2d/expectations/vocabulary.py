@@ -22,8 +22,6 @@ from fleet2d.entities.power import PowerState
 from fleet2d.errors import InputError, ScenarioError, errors_as
 from fleet2d.expectations.expectation import (
     INFINITE,
-    WORDS,
-    Expectation,
     RunSignals,
     Trace,
     combine,
@@ -640,20 +638,6 @@ class events(Condition):
         offset = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
         steps = np.repeat(trace.start, lengths) + offset
         return np.repeat(steps, np.repeat(trace.value.clip(0).astype(np.int64), lengths))
-
-
-def found(body: str, by: str) -> Expectation:
-    """Return whether a robot finds a person who truly is in its view, and not somebody else.
-
-    What the robot itself believes is the event alone, `events("found", by, detail=body)`.
-
-    >>> print(found("ana", by="astro"))
-    events("found", "astro", detail="ana") and in_view("ana", by="astro")
-    """
-    return events(EventKind.FOUND, by, detail=body) & in_view(body, by=by)
-
-
-WORDS[found.__name__] = found
 
 
 class during(Condition):
