@@ -5,7 +5,6 @@ from datetime import timedelta
 from typing import Any
 
 from fleet2d.configuration.problems import counted
-from fleet2d.expectations.verdict import amount
 from fleet2d.studies.sentences import Conclusion, in_words, listed
 from fleet2d.testing.claim import percent, seeds_for
 from fleet2d.testing.gate import (
@@ -20,7 +19,7 @@ from fleet2d.testing.gate import (
     sign_test,
 )
 from fleet2d.testing.suite import TrialReport
-from fleet2d.testing.trials import ASSERT, TEST
+from fleet2d.testing.trials import ASSERT, TEST, margin_text
 
 RATES = (0.9, 0.95, 0.99, 0.999)
 """Rates of which the next one is told with the number of trials that would show it."""
@@ -116,14 +115,10 @@ def _how_often(each: Tally) -> str:
     text = f"failed in {len(each.failed)} of {number}"
     text += f", worst in {worst.label}" if len(each.failed) > 1 else f", in {worst.label}"
     if outcome.margin is not None:
-        text += f", by {_amount(abs(outcome.margin), outcome.unit)}"
+        text += f", by {margin_text(abs(outcome.margin), outcome.unit)}"
     if each.name == ASSERT:
         text += f": {outcome.says.splitlines()[0]}"
     return text
-
-
-def _amount(value: float, unit: str) -> str:
-    return f"{value:g} s" if unit == "s" else amount(value, unit)
 
 
 def _failed(gate: Gate, ordered: Sequence[Tally]) -> str:
@@ -285,4 +280,4 @@ def _row(gate: Gate, each: Tally) -> dict[str, Any]:
 def least_margin(each: Tally) -> str:
     """Return the lowest margin of an expectation as text; empty if it has none."""
     margins = [(o.margin, o.unit) for o in each.outcomes.values() if o.margin is not None]
-    return _amount(*min(margins)) if margins else ""
+    return margin_text(*min(margins)) if margins else ""

@@ -78,7 +78,8 @@ def falsify(
         task = bar.add_task("runs", total=tries if seconds is None else None)
 
         def update(search: "FailureSearch") -> None:
-            narrowest = "" if search.narrowest is None else f", narrowest {search.narrowest[0]:.3g}"
+            size = search.narrowest[1] if search.narrowest else ""
+            narrowest = f", narrowest {size}" if size else ""
             bar.update(task, completed=search.tries, description=f"{search.tries} runs{narrowest}")
 
         begin_s = time.monotonic()

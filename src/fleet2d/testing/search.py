@@ -218,15 +218,15 @@ class TryJob:
         self._body = self._body or self.body()
         return run_trial(Variant(self.scenario(point, seed), {"seed": seed}), self._body)
 
-    def __call__(self, task: TryTask) -> tuple[float | None, str, str | None]:
-        """Return (margin, what failed, error); margin or error is None."""
+    def __call__(self, task: TryTask) -> tuple[float | None, str, str, str | None]:
+        """Return (margin, the same in its unit, what failed, error); margin or error is None."""
         try:
             result = self.run(task.point, task.seed)
         except Exception as error:  # noqa: BLE001 - some points give no valid home; reported
-            return None, "", describe_error(error)
+            return None, "", "", describe_error(error)
         failure = result.first_failure
         what = " ".join(filter(None, [failure.name, failure.kind])) if failure else ""
-        return result.margin, what, None
+        return result.margin, result.amount, what, None
 
 
 class FailingPoint(NamedTuple):
@@ -236,14 +236,14 @@ class FailingPoint(NamedTuple):
         number: Number of the run, from 1.
         point: The point.
         seed: Seed of the run.
-        margin: Margin of the run, below 0.
+        amount: Margin of the run in its unit; empty if it has no size.
         what: The expectation that failed first, and in which way.
     """
 
     number: int
     point: dict[str, Any]
     seed: int
-    margin: float
+    amount: str
     what: str
 
 
@@ -253,7 +253,7 @@ class FailureSearch(TaskQueue):
     Attributes:
         failures: The failures.
         points: The points of all finished runs.
-        narrowest: The smallest margin so far, and its point.
+        narrowest: The smallest margin so far, the same in its unit, and its point.
         errors: Errors of runs that couldn't be simulated, with how often they happened.
     """
 
@@ -271,7 +271,7 @@ class FailureSearch(TaskQueue):
         self._suggested: dict[int, Any] = {}
         self.failures: list[FailingPoint] = []
         self.points: list[Settings] = []
-        self.narrowest: tuple[float, dict[str, Any]] | None = None
+        self.narrowest: tuple[float, str, dict[str, Any]] | None = None
         self.errors: dict[str, int] = {}
 
     def __bool__(self) -> bool:
@@ -333,7 +333,7 @@ class FailureSearch(TaskQueue):
                 "fails": failure.what,
                 "case": self._job.space.text(failure.point),
                 "seed": failure.seed,
-                "margin": failure.margin,
+                "margin": failure.amount or "–",
             }
             for failure in self.failures
         ]
@@ -357,8 +357,9 @@ class FailureSearch(TaskQueue):
             most = 100 * (1 - 0.05 ** (1 / blind))
             yield f"The first {blind} were random, so at most {most:.3g} % of cases fail (95 %)."
         if self.narrowest is not None:
-            margin, point = self.narrowest
-            yield f"The narrowest margin is {margin:.3g}: {self._job.space.text(point)}."
+            _, size, point = self.narrowest
+            if size:
+                yield f"The narrowest margin is {size}: {self._job.space.text(point)}."
 
     def run(
         self,
@@ -376,7 +377,7 @@ class FailureSearch(TaskQueue):
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds
         with closing(run_tasks(crew, self._job, self)) as rounds:
             for end in itertools.chain.from_iterable(rounds):
-                self._add(end.task, *(end.payload or (None, "", end.loss)))
+                self._add(end.task, *(end.payload or (None, "", "", end.loss)))
                 if observer is not None:
                     observer(self)
                 if self.is_over:
@@ -393,21 +394,23 @@ class FailureSearch(TaskQueue):
             point = self._job.space.ask(trial)
         return TryTask(number, number, "", point=point, seed=self._seed + number)
 
-    def _add(self, task: TryTask, margin: float | None, what: str, error: str | None) -> None:
+    def _add(
+        self, task: TryTask, margin: float | None, size: str, what: str, error: str | None
+    ) -> None:
         self.points.append(task.point)
         trial = self._suggested.pop(task.number, None)
         if margin is None:
             text = error or "it could not be run"
             self.errors[text] = self.errors.get(text, 0) + 1
         elif self.narrowest is None or margin < self.narrowest[0]:
-            self.narrowest = margin, task.point
+            self.narrowest = margin, size, task.point
         if self._study is not None and trial is not None:
             from optuna.trial import TrialState
 
             state = TrialState.FAIL if margin is None else None
             self._study.tell(trial, margin, state=state)
         if margin is not None and margin < 0:
-            self.failures.append(FailingPoint(self.tries, task.point, task.seed, margin, what))
+            self.failures.append(FailingPoint(self.tries, task.point, task.seed, size, what))
 
 
 def _optuna(seed: int, startup: int) -> "optuna.Study":

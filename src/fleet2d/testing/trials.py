@@ -18,7 +18,7 @@ from fleet2d.errors import errors_as
 from fleet2d.expectations.expectation import Expectation, Term
 from fleet2d.expectations.parse import read_requirements
 from fleet2d.expectations.temporal import after, at_end, eventually, until
-from fleet2d.expectations.verdict import Verdict, VerdictEvidence
+from fleet2d.expectations.verdict import Verdict, VerdictEvidence, amount
 from fleet2d.floorplan.home import HOME_CACHE
 from fleet2d.floorplan.source import PLAN_CACHE
 from fleet2d.interventions.intervention import Intervention, dump_intervention
@@ -143,6 +143,7 @@ class ExpectationResult:
         holds: Whether it held, or may be untested.
         margin: Margin by which it held, below 0 if it failed, from -1 to 1: comparable between
             expectations of different units.
+        amount: The margin in its unit, as text; empty if it has no size.
         step: The first step of a violation; None if it held, or if it failed at no single step.
         untested: Whether the run didn't put it to the test.
         kind: What kind of violation it is: `MISSED` or `MISSED_BY_THE_END` if something didn't come
@@ -157,6 +158,7 @@ class ExpectationResult:
     text: str
     holds: bool
     margin: float
+    amount: str = ""
     step: int | None = None
     untested: bool = False
     kind: str = ""
@@ -188,6 +190,7 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
         text,
         not verdict.fails,
         margin,
+        margin_text(value, unit) if math.isfinite(value) else "",
         step,
         untested=verdict.holds is None,
         kind=kind_of(expectation),
@@ -204,6 +207,11 @@ def kind_of(expectation: Term) -> str:
         is_at_once = isinstance(expectation, after) and within is None
         kinds += [] if is_at_once else [MISSED_BY_THE_END if within is None else MISSED]
     return next((kind for kind in (MISSED_BY_THE_END, MISSED) if kind in kinds), "")
+
+
+def margin_text(value: float, unit: str) -> str:
+    """Return a margin with its unit: a time to the digit, others to three digits."""
+    return f"{value:g} s" if unit == "s" else amount(value, unit)
 
 
 def comparable(value: float, scale: float) -> float:
@@ -243,8 +251,18 @@ class TrialResult:
     @property
     def margin(self) -> float:
         """The smallest margin of all expectations, -1 to 1; 1 without expectations."""
-        margins = [result.margin for result in (*self.results, *self.failures)]
-        return min(margins, default=1.0)
+        return self._narrowest.margin
+
+    @property
+    def amount(self) -> str:
+        """The same margin in its unit, as text; empty if it has no size."""
+        return self._narrowest.amount
+
+    @property
+    def _narrowest(self) -> ExpectationResult:
+        untouched = ExpectationResult(TEST, "", True, 1.0)
+        results = (*self.results, *self.failures)
+        return min(results, key=lambda result: result.margin, default=untouched)
 
     @property
     def holds(self) -> bool:
@@ -262,7 +280,7 @@ class TrialResult:
         step = max(0, self.steps - 1)
         text = str(self.error) or ASSERT
         line = _line_of(self.error)
-        return (*failed, ExpectationResult(ASSERT, text, False, -1.0, step, kind=line))
+        return (*failed, ExpectationResult(ASSERT, text, False, -1.0, step=step, kind=line))
 
     @property
     def first_failure(self) -> ExpectationResult | None:
