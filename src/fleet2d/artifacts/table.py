@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fleet2d.errors import ArtifactError
 from fleet2d.kernels import I64, Bool
+from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.local_time import Zone, rules_of
 from fleet2d.storage.names import is_word
 
@@ -127,6 +128,11 @@ TIME = Column("time", "time", description="local time")
 def time_column(zone: Zone | None) -> Column:
     """Return the column of times of a run: of UTC, with the time zone of the home if it has one."""
     return TIME if zone is None else replace(TIME, unit=zone.label, description="time")
+
+
+def moment_columns(clock: Clock, step: I64) -> Columns:
+    """Return the first columns of most tables of a run: the steps of rows, and their times."""
+    return {STEP: step, time_column(clock.zone): clock.stamps(step)}
 
 
 @dataclass(frozen=True, slots=True)

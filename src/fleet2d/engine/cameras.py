@@ -24,6 +24,7 @@ from fleet2d.kernels import (
     FORCED_MISS,
     I64,
     MAX_GHOSTS,
+    NOBODY,
     SUB,
     U64,
     About,
@@ -42,7 +43,6 @@ from fleet2d.kernels import (
 )
 from fleet2d.kernels import ViewQueryColumn as Query
 from fleet2d.runtime.clock import DAY_US
-from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event, new_event
 from fleet2d.runtime.local_time import even_parts, stamp_us
 from fleet2d.sight.camera import Disturbance, TableContext, error_tables, is_perfect, stack_lenses
@@ -162,15 +162,16 @@ class Cameras(Watcher):
 
     def disturb(self, disturbances: Sequence[Disturbance]) -> None:
         """Set all disturbances, from the step on at which they look next."""
-        old = self.disturbances
+        lasting = [each for each in self.disturbances if each.injected is None]
         self.disturbances = list(disturbances)
-        others = [[d for d in each if d.injected is None] for each in (old, disturbances)]
-        memory = self._inject() if others[0] == others[1] else self._set_up()
+        is_same = lasting == [each for each in disturbances if each.injected is None]
+        memory = self._inject() if is_same else self._set_up()
         self.memory = carry_over(memory, self.memory, self._forced())
 
     def forget(self) -> list[str]:
         """Forget who is in view, and looks that aren't known yet; return who was in view."""
-        names = [self.name_of(i) for i, is_seen in enumerate(self.memory.seen.tolist()) if is_seen]
+        in_view = np.flatnonzero(self.memory.seen).tolist()
+        names = [self.name_of(identity) for identity in in_view]
         self.memory.seen[:] = 0
         self.memory.noticed[:] = -1
         self.memory.waiting[:] = 0
@@ -179,11 +180,13 @@ class Cameras(Watcher):
     def _disturbed(self) -> Iterator[tuple[int, Disturbance]]:
         """Yield the number of each camera with each of its disturbances, in order."""
         for c, name in enumerate(self.names):
-            yield from ((c, each) for each in self.disturbances if each.is_of(name))
+            for disturbance in self.disturbances:
+                if disturbance.is_of(name):
+                    yield c, disturbance
 
     def _forced(self) -> I64:
         """Return the forced identity of each body in view, (cameras, bodies); see About.FORCED."""
-        index = {other.name: u for u, other in enumerate(self.others)} | {"": -1}
+        index = self.identities
         forced = np.zeros((len(self.names), len(self.others)), np.int64)
         for c, disturbance in self._disturbed():
             if disturbance.missed is not None:
@@ -209,14 +212,12 @@ class Cameras(Watcher):
             perceptions[c] = disturbance.errs or perceptions[c]
         has_errors = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
-        people = [other.name for other in self.others]
         radii = [other.entity.radius * units for other in self.others]
-        context = TableContext(people, radii, lattice, clock.step_us, owner.path)
+        context = TableContext(self.other_names, radii, lattice, clock.step_us, owner.path)
         self.lenses = stack_lenses(lenses, has_errors, context)
         if self.heights is not None:
-            others = slice(self._first, self._first + len(self.others))
             points = self.lenses.bodies.shape[2]
-            self._levels = self.heights.levels(self.row, cameras.values(), others, points)
+            self._levels = self.heights.levels(self.row, cameras.values(), self._rows, points)
         self._perceptions = perceptions
         self._patience = max(lens.patience for lens in lenses)
         errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
@@ -224,9 +225,9 @@ class Cameras(Watcher):
         self._dark = [c for c, disturbance in self._disturbed() if disturbance.dark]
         self.lenses.widest[self._dark] = NO_RANGE
         self.errors.has_ghosts[self._dark] = 0
+        chances = self.lenses.chance
         for c, disturbance in self._disturbed():
-            chance = Fraction(int(self.lenses.chance[c])) * Fraction(disturbance.detection)
-            self.lenses.chance[c] = round(chance)
+            chances[c] = round(Fraction(int(chances[c])) * Fraction(disturbance.detection))
         self.sighting_errors = None
         if self.drift is not None or any(p and p.errors for p in perceptions):
             from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
@@ -240,18 +241,19 @@ class Cameras(Watcher):
 
     def _inject(self) -> SightMemory:
         """Set the false sightings of interventions; return an empty memory with room for them."""
-        index = {other.name: u for u, other in enumerate(self.others)} | {"": -1}
-        to_lattice = self.owner.home.plan.lattice.to_lattice
-        injected = [
-            (c, index[sighting.user], *to_lattice((sighting.x, sighting.y)), sighting.heading)
-            for c, disturbance in self._disturbed()
-            if (sighting := disturbance.injected) is not None and c not in self._dark
-        ]
-        rows = np.array(injected, np.int64).reshape(-1, 5)
-        self.errors = self.errors._replace(injected=rows)
+        index = self.identities
+        lattice = self.owner.home.plan.lattice
+        rows = []
+        for c, disturbance in self._disturbed():
+            sighting = disturbance.injected
+            if sighting is not None and c not in self._dark:
+                x, y = lattice.point_at((sighting.x, sighting.y))
+                rows.append((c, index[sighting.user], x, y, sighting.heading))
+        injected = np.array(rows, np.int64).reshape(-1, 5)
+        self.errors = self.errors._replace(injected=injected)
         clock = self.owner.clock
         count = len(self.others)
-        bursts = count + MAX_GHOSTS * self.errors.has_ghosts + len(self.errors.injected)
+        bursts = count + MAX_GHOSTS * self.errors.has_ghosts + len(injected)
         self.rule = DetectionRule(
             patience=self._patience,
             step_us=clock.step_us,
@@ -261,31 +263,47 @@ class Cameras(Watcher):
             stop_seen=False,
         )
         looks = self.lenses.latency // self.lenses.period + 2
-        return new_memory(len(self.names), count, int((looks * bursts).max()))
+        backlog = int((looks * bursts).max())
+        return new_memory(len(self.names), count, backlog)
 
     def _draw_streams(self) -> None:
         """Set the random stream of each draw, by names: another user doesn't change the others'."""
-        owner = self.owner
+        stream = self.owner.stream
         errors = self.errors
+        draws = list(UserDraw) if self.errs else [UserDraw.DETECT]
         for c, camera in enumerate(self.names):
-            prefix = "" if len(self.names) == 1 and camera == "camera" else f"{camera}: "
+            prefix = "" if self.names == ("camera",) else f"{camera}: "
             for u, other in enumerate(self.others):
-                for draw in UserDraw if self.errs else (UserDraw.DETECT,):
-                    name = f"{prefix}{USER_STREAMS[draw]} {other.name}"
-                    errors.keys[c, u, draw.value] = stream_key(owner.seed, owner.path, name)
-            for ghost_draw, purpose in GHOST_STREAMS.items():
-                name = f"{prefix}{purpose}, false positives"
-                errors.ghost_keys[c, ghost_draw.value] = stream_key(owner.seed, owner.path, name)
+                for draw in draws:
+                    purpose = f"{prefix}{USER_STREAMS[draw]} {other.name}"
+                    errors.keys[c, u, draw.value] = stream(purpose)
+            for ghost_draw, what in GHOST_STREAMS.items():
+                purpose = f"{prefix}{what}, false positives"
+                errors.ghost_keys[c, ghost_draw.value] = stream(purpose)
 
     def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
         """Set how each camera perceives activities."""
         latencies = self.lenses.latency.tolist()
         for name, perception, latency in zip(self.names, perceptions, latencies, strict=True):
-            purposes = (f"{name}: activity {other.name}" for other in self.others)
-            keys = [stream_key(self.owner.seed, self.owner.path, each) for each in purposes]
+            keys = [self.owner.stream(f"{name}: activity {other}") for other in self.other_names]
             confusion = perception.attributes.activity if perception else None
             sense = ActivitySense(latency, np.array(keys, np.uint64), confusion)
             self.activity_senses.append(sense)
+
+    @property
+    def _rows(self) -> slice:
+        """The rows of the bodies that can be seen."""
+        return slice(self._first, self._first + len(self.others))
+
+    @property
+    def other_names(self) -> list[str]:
+        """The names of the bodies that can be seen."""
+        return [other.name for other in self.others]
+
+    @property
+    def identities(self) -> dict[str, int]:
+        """The identity of each name; the empty one is somebody unknown."""
+        return {name: u for u, name in enumerate(self.other_names)} | {"": NOBODY}
 
     @property
     def ends(self) -> tuple[bool, bool]:
@@ -299,7 +317,8 @@ class Cameras(Watcher):
     def waits(self) -> bool:
         """Whether an event of it may end the present span."""
         names = self.event_names
-        return not (self.awaited.isdisjoint(names) and self.owner.plan.interrupts.isdisjoint(names))
+        is_awaited = not self.awaited.isdisjoint(names)
+        return is_awaited or not self.owner.plan.interrupts.isdisjoint(names)
 
     @property
     def counts(self) -> I64:
@@ -314,7 +333,8 @@ class Cameras(Watcher):
             return {}
         xy_of = self.owner.home.plan.lattice.xy_of
         places = self.perceived.tolist()
-        return {self.name_of(i): xy_of(*places[i]) for i, is_seen in enumerate(seen) if is_seen}
+        identities = [identity for identity, is_seen in enumerate(seen) if is_seen]
+        return {self.name_of(identity): xy_of(*places[identity]) for identity in identities}
 
     def name_of(self, identity: int) -> str:
         """Return the name of an identity; empty for somebody unknown."""
@@ -369,11 +389,11 @@ class Cameras(Watcher):
             return
         stops = self.owner.plan.interrupts
         lattice = self.owner.home.plan.lattice
-        index = {other.name: i for i, other in enumerate(self.others)}
+        identities = self.identities
         for event in events:
             if event.step == self.next_step - 1 and event.event in stops:
-                place = self.perceived[index.get(event.detail, len(index))]
-                x, y = lattice.to_metres(place).tolist()
+                identity = identities.get(event.detail, NOBODY)
+                x, y = lattice.to_metres(self.perceived[identity]).tolist()
                 yield self.row, SightEvent(event.event, event.detail, x, y)
 
     def collect(self) -> SightingTable:
@@ -384,35 +404,29 @@ class Cameras(Watcher):
             return NOTHING
         seen = SightingTable.joined(blocks)
         robot = np.full((1, len(seen.distinct)), self.index)
-        return replace(seen, distinct=np.concatenate([seen.distinct.T, robot]).T)
+        columns = np.concatenate([seen.distinct.T, robot])
+        return replace(seen, distinct=columns.T)
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> "Look":
-        if self.owner.home.unlit and self.sighting_errors is None and self._first == 0:
+        first = self.next_step
+        home = self.owner.home
+        if home.unlit and self.sighting_errors is None and self._first == 0:
             from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
 
             self.sighting_errors = SightingErrors(self, self._perceptions)
         may_redo = stop or self.sighting_errors is not None
         old_memory = [array.copy() for array in self.memory] if may_redo else []
         stops = self.ends if stop else (False, False)
-        home = self.owner.home
-        window = bodies.window(self.next_step, end)
-        points = None
+        window = bodies.window(first, end)
         clock = self.owner.clock
         if clock.zone is not None:
-            now_us = self.next_step * clock.step_us
+            now_us = first * clock.step_us
             _, _, start_us = next(even_parts(clock.start, now_us, now_us + 1))
             self.rule = self.rule._replace(start_us=start_us % DAY_US)
-        if self.method is not None:
-            block = bodies.block(self.next_step, end)
-            others = slice(self._first, self._first + len(self.others))
-            crowd = PoseBlock._make(column[others] for column in block)
-            poses = poses_of(block, self.row)
-            first = self.next_step
-            step_us = self.owner.clock.step_us
-            lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
-            with blame("sight.method", first):
-                points = points_seen(self.method, home, lenses, poses, crowd, first, step_us)
-            points[self._dark] = 0
+        points = None if self.method is None else self._points_seen(self.method, bodies, end)
+        heights = None
+        if self.heights is not None:
+            heights = self.heights.with_furniture(self._levels, home)
         count, seen_at, index, distinct, newest, events = detect(
             home.walls,
             self.lenses,
@@ -424,10 +438,10 @@ class Cameras(Watcher):
             self.memory,
             points,
             self.radii,
-            None if self.heights is None else self.heights.with_furniture(self._levels, home),
+            heights,
         )
         sightings = SightingTable(seen_at, index, distinct.T) if len(seen_at) else UNSEEN
-        end = looked = self.next_step + count
+        end = looked = first + count
         if self.sighting_errors is not None:
             before = SightMemory(*old_memory)
             seen = sightings.rows()
@@ -436,11 +450,28 @@ class Cameras(Watcher):
             newest = newest_of(rows, len(newest))
             if differs:
                 patience = self.rule.patience
-                events = self.sighting_errors.events(
-                    rows, self.memory, patience, self.next_step, looked
-                )
-                end = next((step + 1 for step, _, kind in events if stops[kind]), looked)
+                events = self.sighting_errors.events(rows, self.memory, patience, first, looked)
+                end = end_of_span(events, stops, looked)
         return Look(looked, end, sightings, newest, events, old_memory)
+
+    def _points_seen(self, method: FieldOfView, bodies: Bodies, end: int) -> U64:
+        """Return which points of each body a method of sight sees until a step; see `points_seen`.
+
+        Raises:
+            ComponentError: The method returned something else than it should.
+        """
+        first = self.next_step
+        block = bodies.block(first, end)
+        crowd = PoseBlock._make(column[self._rows] for column in block)
+        poses = poses_of(block, self.row)
+        owner = self.owner
+        lenses = self.lenses._replace(widest=np.maximum(self.lenses.widest, 0))
+        with blame("sight.method", first):
+            points = points_seen(
+                method, owner.home, lenses, poses, crowd, first, owner.clock.step_us
+            )
+        points[self._dark] = 0
+        return points
 
 
 def _check_spots(owner: Actor, perceptions: Sequence[Perception | None]) -> None:
@@ -504,6 +535,13 @@ class Look(NamedTuple):
     old_memory: list[I64]
 
 
+def end_of_span(
+    events: Sequence[tuple[int, int, int]], stops: tuple[bool, bool], looked: int
+) -> int:
+    """Return the step after the first event of a kind that ends the span; `looked`: none does."""
+    return next((step + 1 for step, _, kind in events if stops[kind]), looked)
+
+
 def newest_of(rows: I64, identities: int) -> list[int]:
     """Return of each identity the number of its last row, -1 for none."""
     newest = np.full(identities, -1)
@@ -563,18 +601,18 @@ def points_seen(
     Raises:
         ComponentError: The method doesn't return a bool for each point.
     """
-    radii = [[(math.isqrt(n) + SLACK) ** 2 for n in row] for row in lenses.widest.tolist()]
-    widest = np.array(radii, np.int64).reshape(lenses.widest.shape)
+    squares = [(math.isqrt(square) + SLACK) ** 2 for square in lenses.widest.ravel().tolist()]
+    widest = np.array(squares, np.int64).reshape(lenses.widest.shape)
     queries, number = view_queries(
         lenses, widest, SLACK, robot, crowd.x, crowd.y, crowd.away, first, step_us
     )
-    answers = np.zeros(len(queries) + 1, np.uint64)
-    has_moved = queries[1:, : Query.EYE_HEADING + 1] != queries[:-1, : Query.EYE_HEADING + 1]
+    eyes = queries[:, : Query.EYE_HEADING + 1]
+    has_moved = eyes[1:] != eyes[:-1]
     has_moved[:, Query.BODY] = False
-    begins = [0, *(np.flatnonzero(has_moved.any(axis=1)) + 1).tolist()] if len(queries) else []
-    for begin, end in zip(begins, [*begins[1:], len(queries)], strict=False):
-        answers[begin + 1 : end + 1] = _answers(method, home, lenses, queries[begin:end])
-    return answers[number]
+    begins = np.flatnonzero(has_moved.any(axis=1)) + 1
+    groups = np.split(queries, begins) if len(queries) else []
+    answers = [_answers(method, home, lenses, group) for group in groups]
+    return np.concatenate([np.zeros(1, np.uint64), *answers])[number]
 
 
 def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U64:
@@ -582,8 +620,10 @@ def _answers(method: FieldOfView, home: Home, lenses: Lenses, queries: I64) -> U
     camera, _, x, y, heading = queries[0, : Query.EYE_HEADING + 1].tolist()
     ends = lenses.near_squared[camera], lenses.far_squared[camera], lenses.half_angle[camera]
     reach = Reach(*map(int, ends))
-    bodies = lenses.bodies[camera, queries[:, Query.BODY], : int(lenses.points[camera]) + 1]
-    points = (bodies + queries[:, None, [Query.BODY_X, Query.BODY_Y]]).reshape(-1, 2)
+    count = int(lenses.points[camera]) + 1
+    bodies = lenses.bodies[camera, queries[:, Query.BODY], :count]
+    places = queries[:, None, [Query.BODY_X, Query.BODY_Y]]
+    points = (bodies + places).reshape(-1, 2)
     flags: object = method.sees(home, x, y, heading, reach, points)  # a user's own may be wrong
     if not isinstance(flags, np.ndarray) or flags.dtype != bool or flags.shape != (len(points),):
         raise ComponentError(

@@ -7,7 +7,6 @@ lights. Changes are made before decisions in a step, so they hold for all bodies
 
 import heapq
 from collections.abc import Sequence
-from datetime import datetime, timedelta
 from typing import NamedTuple
 
 import numpy as np
@@ -56,13 +55,12 @@ class PeopleSwitches:
         self._home = basis.home
         self._clock = basis.clock
         self._bodies = basis.bodies
-        users = basis.scenario.users.values()
         sun = basis.clock.sun
-        self._hours: dict[int, tuple[HoursSpan | Sun, ...]] = {
-            row: tuple(sun if span == DARK and sun else span for span in user.lights)
-            for row, user in enumerate(users)
-            if user.lights
-        }
+        self._hours: dict[int, tuple[HoursSpan | Sun, ...]] = {}
+        for row, user in enumerate(basis.scenario.users.values()):
+            if user.lights:
+                hours = (sun if span == DARK and sun else span for span in user.lights)
+                self._hours[row] = tuple(hours)
         self._awake_in = dict.fromkeys(self._hours, NOWHERE)
         if self._hours:
             basis.home.set_lights(range(len(basis.home.rooms)), is_on=False)
@@ -123,9 +121,10 @@ def crossings(track: Breakpoints, line: Segment, *, jumps: bool = True) -> list[
     x, y = track.x, track.y
     side = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     crosses = (side[:-1] > 0) != (side[1:] > 0)
-    legs = np.flatnonzero(crosses if jumps else crosses & (np.diff(track.time) > 0))
+    if not jumps:
+        crosses &= np.diff(track.time) > 0
     times: list[int] = []
-    for i in legs.tolist():
+    for i in np.flatnonzero(crosses).tolist():
         px = int(x[i])
         py = int(y[i])
         qx = int(x[i + 1])
@@ -145,9 +144,8 @@ def way_ahead(actor: Actor, now_us: int) -> LineString | None:
     assert isinstance(actor.motion, Track)
     track = actor.motion.breakpoints
     ahead = track.time > now_us
-    points = np.stack(
-        [np.append(actor.state.x, track.x[ahead]), np.append(actor.state.y, track.y[ahead])], axis=1
-    )
+    rest = np.column_stack([track.x[ahead], track.y[ahead]])
+    points = np.vstack([actor.state.position, rest])
     return LineString(points) if (points != points[0]).any() else None
 
 
@@ -204,12 +202,12 @@ class ChangeQueue:
         # By step; those of one step happen in the order in which they were put into the queue.
         self._queue: list[tuple[int, int, DueChange]] = []
         self._count = 0
-        for number, door in enumerate(self.doors.values()):
+        for name, door in self.doors.items():
             if door.locked:
-                self._put(DueChange(0, HomeChange(lock=self.names[number]), "at first"))
+                self._put(DueChange(0, HomeChange(lock=name), "at first"))
             if not door.open:
-                self._put(DueChange(0, HomeChange(shut=self.names[number]), "at first"))
-            self._schedule(number, door)
+                self._put(DueChange(0, HomeChange(shut=name), "at first"))
+            self._schedule(name, door)
 
     def slow(self, areas: Sequence[SlowArea], step: int) -> None:
         """Set the areas that slow robots down, besides those of the floor plan, at a step."""
@@ -236,16 +234,17 @@ class ChangeQueue:
 
     def expect(self, row: int, actor: Actor) -> None:
         """Schedule the doors and lights that a body uses on its way, after it has a new plan."""
+        plan = (row, actor.planned_at)
         for step in self._switches.steps(row, actor):
-            self._put(DueChange(step, None, actor.name, opens_for=(row, actor.planned_at)))
+            self._put(DueChange(step, None, actor.name, opens_for=plan))
         if not self.names or not actor.entity.opens_doors or not isinstance(actor.motion, Track):
             return
+        jumps = not self.home.plan.portals
         for door in range(len(self.names)):
             line = self.home.door_line(door)
-            jumps = not self.home.plan.portals
             for moment in crossings(actor.motion.breakpoints, line, jumps=jumps):
-                step = max(actor.planned_at, (moment - OPENS_AHEAD_US) // self.clock.step_us)
-                plan = (row, actor.planned_at)
+                opens_at = (moment - OPENS_AHEAD_US) // self.clock.step_us
+                step = max(actor.planned_at, opens_at)
                 self._put(DueChange(step, None, actor.name, door, plan, moment))
 
     def make(self, step: int) -> list[Event]:
@@ -299,22 +298,27 @@ class ChangeQueue:
         if self._actors[row].planned_at != planned_at:
             return []
         door = due.door
-        self._used_us[door] = max(self._used_us[door], due.passed_us)
-        after = self.doors[self.names[door]].closes_after
-        if after is not None:
-            shuts = self.clock.step_at_or_after(due.passed_us + micros(after))
-            self._put(DueChange(max(shuts, step + 1), None, door=door))
+        self._use(door, due.passed_us, step)
         if door not in self.home.shut or door in self.home.locked:
             return []
         return self._turn(door, True, due, step)
+
+    def _use(self, door: int, moment_us: int, step: int) -> None:
+        """Note at a step that a door is used at a moment: it may close by itself afterwards."""
+        after = self.doors[self.names[door]].closes_after
+        if after is not None:
+            self._used_us[door] = max(self._used_us[door], moment_us)
+            shuts = self.clock.step_at_or_after(moment_us + micros(after))
+            self._put(DueChange(max(shuts, step + 1), None, door=door))
 
     def _close_unused(self, due: DueChange, step: int) -> list[Event]:
         """Shut a door that has not been used for its `closes_after`."""
         door = due.door
         after = self.doors[self.names[door]].closes_after
-        if after is None or step * self.clock.step_us < self._used_us[door] + micros(after):
+        if after is None or door in self.home.shut:
             return []
-        return [] if door in self.home.shut else self._turn(door, False, due, step)
+        unused_us = step * self.clock.step_us - self._used_us[door]
+        return [] if unused_us < micros(after) else self._turn(door, False, due, step)
 
     def _turn(self, door: int, is_open: bool, due: DueChange, step: int) -> list[Event]:
         shape = self._door_shape(door)
@@ -323,19 +327,16 @@ class ChangeQueue:
             return []
         self.home.set_door(door, is_open=is_open)
         self._stop(step, None if is_open else shape)
-        after = self.doors[self.names[door]].closes_after
-        if is_open and due.opens_for is None and after is not None:
-            now = step * self.clock.step_us
-            self._used_us[door] = max(self._used_us[door], now)
-            shuts = self.clock.step_at_or_after(now + micros(after))
-            self._put(DueChange(shuts, None, door=door))
+        if is_open and due.opens_for is None:
+            self._use(door, step * self.clock.step_us, step)
         kind = EventKind.OPENED if is_open else EventKind.SHUT
         return [Event(step, self.names[door], kind, due.by)]
 
     def _move(self, due: DueChange, change: HomeChange, step: int) -> list[Event]:
         plan = self.home.plan
+        old = self.home.object(change.target)
         assert change.to is not None
-        new = move_object(self.home.object(change.target), plan.lattice, change.to, change.turn_deg)
+        new = move_object(old, plan.lattice, change.to, change.turn_deg)
         shape = np.asarray(lattice_footprint(plan, new).exterior.coords)
         is_solid = new.blocks != "nothing"
         if is_solid and self._is_blocked(shape):
@@ -390,22 +391,20 @@ class ChangeQueue:
         wait = max(1, self.clock.step_at_or_after(RETRY_US))
         self._put(due._replace(step=step + wait))
 
-    def _schedule(self, number: int, door: Door) -> None:
+    def _schedule(self, name: str, door: Door) -> None:
         """Put the schedule of a door into the queue, for all days of the run."""
-        begin, end = self.clock.start, self.clock.time(self.clock.steps)
-        for midnight in midnights(begin, end):
+        clock = self.clock
+        for midnight in midnights(clock.start, clock.time(clock.steps)):
             for turn in door.schedule:
-                if midnight + turn.at < begin:
+                moment = midnight + turn.at
+                if moment < clock.start:
                     continue
+                step = clock.step_at_or_after(clock.elapsed(moment))
                 opens = {True: "open", False: "shut", None: ""}[turn.open]
                 locks = {True: "lock", False: "unlock", None: ""}[turn.locked]
                 for verb in filter(None, (opens, locks)):
-                    change = HomeChange.model_validate({verb: self.names[number]})
-                    self._put(DueChange(self._step_of(midnight + turn.at), change, "schedule"))
-
-    def _step_of(self, time: datetime | timedelta) -> int:
-        elapsed = micros(time) if isinstance(time, timedelta) else self.clock.elapsed(time)
-        return max(0, self.clock.step_at_or_after(elapsed))
+                    change = HomeChange.model_validate({verb: name})
+                    self._put(DueChange(step, change, "schedule"))
 
     def check_names(self, change: HomeChange) -> None:
         """Refuse a change of something unknown.

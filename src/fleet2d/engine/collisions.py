@@ -22,7 +22,7 @@ from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.entity import Robot
 from fleet2d.entities.giving_way import TOUCHING_GAP_M, Surroundings, plan_after, plan_around
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.kernels import I64, U8, Bool, Poses, line_of_sight, locate
+from fleet2d.kernels import I64, U8, Bool, Poses, line_of_sight
 from fleet2d.runtime.events import EventKind
 
 # Time for which a body ignores another one that it goes round or squeezes past.
@@ -115,10 +115,6 @@ class BlockedWays(Watcher):
         row = now.actor.row
         lattice = now.actor.home.plan.lattice
         actor = self._actors[row]
-        others = [a for a in self._actors if a.row != row and not a.state.away]
-        reach = self._reach(row, np.array([a.row for a in others], np.int64))
-        positions = np.array([a.state[:2] for a in others], np.int64).reshape(-1, 2)
-        clear = np.column_stack([positions, reach + int(lattice.cell * lattice.units_per_m)])
         step = now.step
         step_us = actor.clock.step_us
         wait = self._waits[row]
@@ -133,6 +129,11 @@ class BlockedWays(Watcher):
             plan: Plan | None = plan_after(now, actor.plan, step + 1, notes)
             self._waits[row] = Wait(since, step + 1, other)
         else:
+            others = [a for a in self._actors if a.row != row and not a.state.away]
+            reach = self._reach(row, np.array([a.row for a in others], np.int64))
+            cell = int(lattice.cell * lattice.units_per_m)
+            positions = np.array([a.state.position for a in others], np.int64).reshape(-1, 2)
+            clear = np.column_stack([positions, reach + cell])
             plan = plan_around(now, actor.plan, bodies.timelines, clear)
             until = step + micros(PASSING_TIME) // step_us + 1
             self._waits[row] = Wait()
@@ -151,23 +152,27 @@ class BlockedWays(Watcher):
     ) -> tuple[int, int] | None:
         """Return the first of some columns at which another body blocks one, and its row."""
         x, y, away = places
-        moved = (x[row, columns + 1] != x[row, columns]) | (y[row, columns + 1] != y[row, columns])
-        moves = columns[moved & ((away[row, columns] | away[row, columns + 1]) == 0)]
+        after = columns + 1
+        has_moved = (x[row, after] != x[row, columns]) | (y[row, after] != y[row, columns])
+        is_home = (away[row, columns] | away[row, after]) == 0
+        moves = columns[has_moved & is_home]
         # A robot with `gives_way` keeps clear of people by that option.
         polite = getattr(self._actors[row].entity, "gives_way", None) is not None
         others = np.arange(self._users if polite else 0, len(self._actors))
         others = others[others != row]
         if not len(moves) or not len(others):
             return None
-        met = _approach(x, y, row, others[:, None], moves, self._reach(row, others)[:, None])
-        met &= (away[others[:, None], moves] | away[others[:, None], moves + 1]) == 0
+        reach = self._reach(row, others)[:, None]
+        others = others[:, None]
+        met = _approach(x, y, row, others, moves, reach)
+        met &= (away[others, moves] | away[others, moves + 1]) == 0
         passed = self._passes[row]
-        met &= (others != passed.blocker)[:, None] | (first + moves >= passed.until)
+        met &= (others != passed.blocker) | (first + moves >= passed.until)
         blocked = met.any(axis=0)
         if not blocked.any():
             return None
         at = int(blocked.argmax())
-        return int(moves[at]), int(others[met[:, at].argmax()])
+        return int(moves[at]), int(others[met[:, at].argmax(), 0])
 
     def _reach(self, row: int, others: I64) -> I64:
         """Return the distances at which a body touches others [lattice units], int64 (n,)."""
@@ -192,10 +197,13 @@ def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -
     Returns:
         bool (n, m).
     """
-    dx, dy = (c[row, columns + 1] - c[row, columns] for c in (x, y))
-    other_dx, other_dy = (c[others, columns + 1] - c[others, columns] for c in (x, y))
-    away_x, away_y = (c[others, columns] - c[row, columns] for c in (x, y))
-    vx, vy = dx - other_dx, dy - other_dy
+    after = columns + 1
+    dx = x[row, after] - x[row, columns]
+    dy = y[row, after] - y[row, columns]
+    away_x = x[others, columns] - x[row, columns]
+    away_y = y[others, columns] - y[row, columns]
+    vx = dx - (x[others, after] - x[others, columns])
+    vy = dy - (y[others, after] - y[others, columns])
     way = vx * vx + vy * vy
     towards = away_x * vx + away_y * vy
     near = reach * reach
@@ -244,7 +252,8 @@ class Clearance(Watcher):
         waiting = robot.waiting
         if waiting is None:
             return end
-        (x, y, was_away), (xs, ys, away) = waiting.surroundings.users.T[:, :, None], people
+        x, y, was_away = waiting.surroundings.users.T[:, :, None]
+        xs, ys, away = people
         has_changed = ((xs != x) | (ys != y) | (away != was_away)).any(axis=0)
         has_changed |= waiting.surroundings.arrangement != robot.arrangement
         column = int(has_changed.argmax())
@@ -271,10 +280,11 @@ class Clearance(Watcher):
         if robot is None:
             return None
         step = bodies.step
-        columns = zip(bodies.pose_at(row, step), bodies.pose_at(row, step + 1), strict=True)
-        poses = Poses(*(np.array(column) for column in columns))
-        if poses.x[0] == poses.x[1] and poses.y[0] == poses.y[1]:
+        now = bodies.pose_at(row, step)
+        then = bodies.pose_at(row, step + 1)
+        if now.position == then.position:
             return None
+        poses = Poses(*np.array([now, then]).T)
         states = np.array([user.state for user in self._users], np.int64)
         x, y, _, away = np.repeat(states[:, :, None], 2, axis=2).swapaxes(0, 1)
         meeting = self._first(robot, poses, (x, y, away), step, begin=0)
@@ -283,13 +293,15 @@ class Clearance(Watcher):
     def surroundings(self, robot: DecidingActor) -> Surroundings:
         """Return the present places of people."""
         units = robot.home.plan.lattice.units_per_m
-        rows = [
-            (u.state.x, u.state.y, int((u.entity.radius + robot.entity.radius) * units))
-            for u in self._users
-            if not u.state.away
-        ]
-        everybody = [(u.state.x, u.state.y, u.state.away) for u in self._users]
-        people = np.array(rows, np.int64).reshape(-1, 3)
+        present = []
+        everybody = []
+        for user in self._users:
+            x, y, _, away = user.state
+            everybody.append((x, y, away))
+            if not away:
+                gap_m = user.entity.radius + robot.entity.radius
+                present.append((x, y, int(gap_m * units)))
+        people = np.array(present, np.int64).reshape(-1, 3)
         return Surroundings(people, np.array(everybody, np.int64), robot.arrangement)
 
     def _first(
@@ -298,7 +310,9 @@ class Clearance(Watcher):
         """Return the first column, from `begin` to the last but one, and the user it drives at."""
         assert isinstance(robot.entity, Robot)
         assert robot.entity.gives_way is not None
-        (xs, ys, away), x, y = people, poses.x, poses.y
+        xs, ys, away = people
+        x = poses.x
+        y = poses.y
         moves = np.flatnonzero((x[1:] != x[:-1]) | (y[1:] != y[:-1]))
         moves = moves[moves >= begin]
         if not len(moves):  # the usual case: it stands
@@ -319,18 +333,13 @@ class Clearance(Watcher):
             distance = (now_x - user_x) ** 2 + (now_y - user_y) ** 2
             next_distance = (next_x - user_x) ** 2 + (next_y - user_y) ** 2
             is_close = (next_distance <= (clearance * units) ** 2) & (next_distance < distance)
-            is_close &= (away[number, moves] == 0) & (poses.away[moves] == 0)
+            is_close &= (away[number, moves] | poses.away[moves]) == 0
             for move in np.flatnonzero(is_close).tolist():
                 column = int(moves[move])
                 if first_meeting is not None and column >= first_meeting[0]:
                     break
-                user_place = int(user_x[move]), int(user_y[move])
-                if _sees(robot, int(now_x[move]), int(now_y[move]), user_place):
+                sight = now_x[move], now_y[move], user_x[move], user_y[move]
+                if line_of_sight(robot.home.barriers, *map(int, sight)):
                     first_meeting = column, number
                     break
         return first_meeting
-
-
-def _sees(robot: DecidingActor, x: int, y: int, place: tuple[int, int]) -> bool:
-    walls = robot.home.barriers
-    return bool(line_of_sight(walls, x, y, locate(walls, x, y), *place))

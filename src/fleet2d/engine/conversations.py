@@ -4,11 +4,10 @@ All of it follows from the poses and plans alone, step by step, so it doesn't de
 span ends with each question and answer, and where the robot's plan waits for requests to come up.
 """
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
-
-import numpy as np
 
 from fleet2d.configuration.units import micros
 from fleet2d.engine.basis import Basis, PlannedNote, Watcher, notes_of
@@ -18,6 +17,7 @@ from fleet2d.entities.body import NEVER, Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.plan import Note
 from fleet2d.errors import ScenarioError
+from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.interactions.answers import (
     ASLEEP,
@@ -30,9 +30,9 @@ from fleet2d.interactions.answers import (
 )
 from fleet2d.interactions.attitude import AttitudeState
 from fleet2d.interactions.interaction import Interaction, Outcome, Request, RequestQueue
-from fleet2d.kernels import TURN, PoseBlock, heading_of, line_of_sight, locate
+from fleet2d.kernels import TURN, PoseBlock, heading_of, line_of_sight
 from fleet2d.runtime.clock import DAY, midnight_of
-from fleet2d.runtime.determinism import Draws, stream_key
+from fleet2d.runtime.determinism import Draws
 from fleet2d.runtime.events import Event, EventKind
 
 LYING = POSTURES.index("lie")
@@ -150,14 +150,15 @@ class Conversations(Watcher):
     def _look_ahead(self) -> None:
         """Note when anything happens next that doesn't depend on the plans of robots."""
         steps = [NEVER, *(reply.step for reply in self._replies)]
-        steps += [start[0] for start in self._starts] + [ban[0] for ban in self._bans]
+        steps += [start[0] for start in self._starts]
+        steps += [ban[0] for ban in self._bans]
         if self._initiators:
             steps.append(self._day_begin(self._begun_days))
         self._agenda = max(min(steps), self.next_step)
         self._next = None
         for row, queue in self.queues.items():
-            changes = queue.next_changes().items()
-            self._changes[row] = {k: max(self._step_of(t), self.next_step) for k, t in changes}
+            steps_of = {kind: self._step_of(time) for kind, time in queue.next_changes().items()}
+            self._changes[row] = {k: max(step, self.next_step) for k, step in steps_of.items()}
 
     def _step_of(self, time: datetime) -> int:
         return self._clock.step_at_or_after(self._clock.elapsed(time))
@@ -172,38 +173,51 @@ class Conversations(Watcher):
         self._last = []
         if end == first:
             return ()
-        events = [
-            Event(at, self.actors[row].name, EventKind.OPPORTUNITY, text)
-            for row, queue in self.queues.items()
-            for at, text in queue.take_opportunities()
-        ]
+        events: list[Event] = []
+        for row, queue in self.queues.items():
+            name = self.actors[row].name
+            for at, text in queue.take_opportunities():
+                events.append(Event(at, name, EventKind.OPPORTUNITY, text))
         step = end - 1
-        block = None
-        is_quiet = self._next is not None and step < self._next
-        if is_quiet and all(step < at for each in self._changes.values() for at in each.values()):
+        if self._is_quiet(step):
             return events
         for row, queue in self.queues.items():
+            events += self._change_requests(row, queue, first, step)
             robot = self.actors[row]
-            for change in queue.advance(self._clock.time(step)):
-                at = max(self._step_of(change.time), first)
-                interaction = change.request.interaction
-                text = f"{change.request.name} {interaction.to}"
-                events.append(Event(at, robot.name, change.event, text))
-                if change.event == EventKind.DUE:
-                    self.wanted.append(Wanted(at, robot.name, text, interaction))
-                self._tell(row, change.event, text)
-            asked = [q for q in notes_of(robot, EventKind.ASKS) if q.step == step]
-            asked += [q for q in self._questions if q.step == step and q.row == row]
+            asked = [*notes_of(robot, EventKind.ASKS), *self._questions]
             for question in dict.fromkeys(asked):
-                block = block or bodies.block(step, end + 1)
-                self._ask(question, block)
+                if question.step == step and question.row == row:
+                    self._ask(question, bodies.block(step, end + 1))
         self._questions = []
-        events += self._end_bans(step) + self._start(step, bodies)
+        events += self._end_bans(step)
+        events += self._start(step, bodies)
         for pending in [reply for reply in self._replies if reply.step <= step]:
             self._replies.remove(pending)
             events += self._give(pending, step, bodies)
         self._look_ahead()
         return events
+
+    def _is_quiet(self, step: int) -> bool:
+        """Whether nothing happens up to a step: no question, no answer, and no request changes."""
+        if self._next is None or step >= self._next:
+            return False
+        return all(
+            step < min(changes.values(), default=NEVER) for changes in self._changes.values()
+        )
+
+    def _change_requests(
+        self, row: int, queue: RequestQueue, first: int, step: int
+    ) -> Iterator[Event]:
+        """Let the requests of a robot come up and go by, and yield the events of that."""
+        name = self.actors[row].name
+        for change in queue.advance(self._clock.time(step)):
+            at = max(self._step_of(change.time), first)
+            interaction = change.request.interaction
+            text = f"{change.request.name} {interaction.to}"
+            if change.event == EventKind.DUE:
+                self.wanted.append(Wanted(at, name, text, interaction))
+            self._tell(row, change.event, text)
+            yield Event(at, name, change.event, text)
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
         """Yield the robots with plans that wait for an answer, or for a request that came up."""
@@ -212,9 +226,7 @@ class Conversations(Watcher):
                 yield row, event
 
     def _tell(self, row: int, event: str, text: str) -> None:
-        actor = self.actors[row]
-        x, y = actor.home.plan.lattice.xy_of(actor.state.x, actor.state.y)
-        self._last.append((row, SightEvent(event, text, x, y)))
+        self._last.append((row, SightEvent(event, text, *self.actors[row].xy)))
 
     def _ask(self, question: PlannedNote, block: PoseBlock) -> None:
         """Let the addressed person notice the robot, and draw the answer."""
@@ -273,12 +285,15 @@ class Conversations(Watcher):
 
     def _addressed(self, row: int, meant: str, block: PoseBlock) -> int | None:
         """Return the user nearest to a robot, or the one meant at equal distance; None: nobody."""
-        x, y = block.x[:, 0], block.y[:, 0]
-        away2 = (x[: self.users] - x[row]) ** 2 + (y[: self.users] - y[row]) ** 2
+        x, y = _point(row, block)
         reach = round(EARSHOT_M * self.actors[row].home.plan.lattice.units_per_m)
-        near = [u for u in range(self.users) if not block.away[u, 0] and away2[u] <= reach**2]
-        ranked = [(int(away2[u]), self.actors[u].name != meant, u) for u in near]
-        return min(ranked)[-1] if ranked else None
+        near = []
+        for user in range(self.users):
+            user_x, user_y = _point(user, block)
+            squared = (user_x - x) ** 2 + (user_y - y) ** 2
+            if not block.away[user, 0] and squared <= reach**2:
+                near.append((squared, self.actors[user].name != meant, user))
+        return min(near)[-1] if near else None
 
     def _circumstances(
         self, user: int, question: PlannedNote, interaction: Interaction, block: PoseBlock
@@ -286,36 +301,32 @@ class Conversations(Watcher):
         person = self.actors[user]
         row = question.row
         home = person.home
-        walls = home.walls
-        lattice = home.plan.lattice
-        x, y = int(block.x[user, 0]), int(block.y[user, 0])
-        robot_x = int(block.x[row, 0])
-        robot_y = int(block.y[row, 0])
-        gap = np.array([robot_x - x, robot_y - y], np.int64)
-        off = (heading_of(robot_x - x, robot_y - y) - int(block.heading[user, 0])) % TURN
-        rooms = [self._room(u, block) for u in range(self.users)]
-        others = sum(u != user and r is not None and r == rooms[user] for u, r in enumerate(rooms))
-        room = rooms[user]
+        x, y = _point(user, block)
+        robot_x, robot_y = _point(row, block)
+        dx = robot_x - x
+        dy = robot_y - y
+        turn = (heading_of(dx, dy) - int(block.heading[user, 0])) % TURN
+        room = self._room(user, block)
+        rooms = [self._room(other, block) for other in range(self.users)]
         return Circumstances(
             time=person.clock.time(question.step),
             name=question.text.rpartition(" ")[0],
             interaction=interaction,
             activity=self._activity_at(user, question.step),
             room="" if room is None else home.rooms[room].type,
-            company=others,
+            company=0 if room is None else rooms.count(room) - 1,
             is_moving=bool((block.x[user, 1], block.y[user, 1]) != (x, y)),
             is_lying=bool(block.posture[user, 0] == LYING),
-            distance=float(np.sqrt(np.float64((gap * gap).sum()))) / lattice.units_per_m,
-            in_sight=bool(line_of_sight(walls, x, y, locate(walls, x, y), robot_x, robot_y)),
-            from_behind=min(off, TURN - off) > FRONT,
+            distance=math.sqrt(dx * dx + dy * dy) / home.plan.lattice.units_per_m,
+            in_sight=line_of_sight(home.walls, x, y, robot_x, robot_y),
+            from_behind=min(turn, TURN - turn) > FRONT,
         )
 
     def _room(self, row: int, block: PoseBlock) -> int | None:
         """Return the index of the room that a body is in at the begin of a block."""
         if block.away[row, 0]:
             return None
-        x, y = int(block.x[row, 0]), int(block.y[row, 0])
-        room = self.actors[row].home.plan.room_of_point(x, y)
+        room = self.actors[row].home.plan.room_of_point(*_point(row, block))
         return None if room is None else room.index
 
     def _activity_at(self, row: int, step: int) -> str:
@@ -339,12 +350,14 @@ class Conversations(Watcher):
                 self._accepted[row] = request, step
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
-        user = next(a.row for a in self.actors if a.name == text.rpartition(" ")[2])
+        name, _, person = text.rpartition(" ")
+        user = next(actor.row for actor in self.actors if actor.name == person)
         events = self._obey(row, user, reply.outcome, text, step, bodies)
-        asked = queue.interactions.get(text.rpartition(" ")[0])
+        asked = queue.interactions.get(name)
         if reply.outcome != Outcome.ACCEPTED or asked is None or asked.do != "ask":
             return events
-        about = next((a.row for a in self.actors[: self.users] if a.name == asked.about), None)
+        people = self.actors[: self.users]
+        about = next((user.row for user in people if user.name == asked.about), None)
         if about is None:
             return events
         where = f"{asked.about} {self._whereabouts(about, user, bodies.block(step, step + 1))}"
@@ -378,7 +391,8 @@ class Conversations(Watcher):
             for_good = answers.has_enough(self.attitudes[user, row])
             lasts = None if for_good else answers.off_for
             self._switch_off(robot, lasts, step + 1, f"users.{person.name}")
-            events += [Event(step, robot.name, EventKind.GIVEN_UP, person.name)] * for_good
+            if for_good:
+                events.append(Event(step, robot.name, EventKind.GIVEN_UP, person.name))
         return [Event(step, robot.name, str(outcome), text), *events]
 
     def _switch_off(
@@ -438,8 +452,9 @@ class Conversations(Watcher):
             for user, row in self._initiators:
                 person = self.actors[user]
                 robot = self.actors[row]
-                key = stream_key(person.seed, person.path, f"initiative {robot.name}")
-                for start in self.answers[user].initiative.starts(Draws(key, self._begun_days)):
+                key = person.stream(f"initiative {robot.name}")
+                draws = Draws(key, self._begun_days)
+                for start in self.answers[user].initiative.starts(draws):
                     at = self._step_of(midnight + start.day_share * DAY)
                     if at > step:
                         self._starts.append((at, user, row, start.kind))
@@ -447,11 +462,10 @@ class Conversations(Watcher):
             self._starts.sort()
         due = [start for start in self._starts if start[0] <= step]
         self._starts = self._starts[len(due) :]
-        return [
-            event
-            for _, user, row, kind in due
-            for event in self._turn_to(user, row, kind, step, bodies)
-        ]
+        events: list[Event] = []
+        for _, user, row, kind in due:
+            events += self._turn_to(user, row, kind, step, bodies)
+        return events
 
     def _turn_to(self, user: int, row: int, kind: str, step: int, bodies: Bodies) -> list[Event]:
         """Let a person call a robot, ask it something, or complain; return what happens."""
@@ -461,17 +475,17 @@ class Conversations(Watcher):
         if robot.is_off or block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
             return []
         lattice = robot.home.plan.lattice
-        point = (int(block.x[user, 0]), int(block.y[user, 0]))
+        x, y = _point(user, block)
         if kind == "call":
-            near = robot.space.nearest(*point, robot.part) or (robot.state.x, robot.state.y)
+            near = robot.space.nearest(x, y, robot.part) or robot.state.position
             robot.receive(Command("come", place=lattice.xy_of(*near)), step + 1)
             return [Event(step, robot.name, EventKind.CALLED, f"come {person.name}")]
         if kind == "question":
             reach = EARSHOT_M * lattice.units_per_m
-            away2 = (int(block.x[row, 0]) - point[0]) ** 2 + (int(block.y[row, 0]) - point[1]) ** 2
-            if away2 > reach**2:
+            robot_x, robot_y = _point(row, block)
+            if (robot_x - x) ** 2 + (robot_y - y) ** 2 > reach**2:
                 return []
-            asked = SightEvent(EventKind.QUESTION, person.name, *lattice.xy_of(*point))
+            asked = SightEvent(EventKind.QUESTION, person.name, *lattice.xy_of(x, y))
             self._last.append((row, asked))
             return [Event(step, robot.name, EventKind.QUESTION, person.name)]
         room = self._room(user, block)
@@ -484,6 +498,11 @@ class Conversations(Watcher):
             return []
         self.answers[user].months.let_down(state, outcome)
         return self._obey(row, user, outcome, person.name, step, bodies)
+
+
+def _point(row: int, block: PoseBlock) -> LatticePoint:
+    """Return where a body is at the begin of a block [lattice units]."""
+    return int(block.x[row, 0]), int(block.y[row, 0])
 
 
 def _broken_note(robot: DecidingActor, step: int) -> Note | None:

@@ -15,7 +15,7 @@ from fleet2d.entities.behavior import Attention, SightEvent
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.floorplan.placed_objects import POSTURES
-from fleet2d.kernels import I64, Bool, PoseBlock, line_of_sight, locate
+from fleet2d.kernels import I64, Bool, PoseBlock, line_of_sight
 from fleet2d.runtime.events import Event, EventKind
 
 # The squared distance of a person out of reach: larger than any home [lattice units²].
@@ -70,9 +70,12 @@ class Pair:
         }
         return [Encounter(c, kind, self.robot, self) for kind, c in kinds.items() if c is not None]
 
-    def hears(self, column: int) -> bool:
-        """Whether the person hears a call of the robot at a step: a column of the scanned span."""
-        return bool(self.distances[column] <= self.attention.hears * self.attention.hears)
+    def hears(self, call: PlannedNote, column: int) -> bool:
+        """Whether the person is called by the robot in a column of the scanned span, and hears."""
+        limit = self.attention.hears
+        if call.row != self.robot.row or call.text not in ("", self.user.name):
+            return False
+        return bool(self.distances[column] <= limit * limit)
 
     def advance(self, block: PoseBlock, count: int, events: Sequence[str]) -> None:
         """Update the state after `count` steps, with encounters in the last one."""
@@ -125,7 +128,7 @@ class Pair:
                 continue
             checked = places
             x, y, robot_x, robot_y = places
-            if line_of_sight(walls, x, y, locate(walls, x, y), robot_x, robot_y):
+            if line_of_sight(walls, x, y, robot_x, robot_y):
                 return int(column)
         return None
 
@@ -178,21 +181,21 @@ class Encounters(Watcher):
         first = self.next_step
         block = bodies.block(first, end)
         self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]
-        planned = [c for robot in self._robots for c in notes_of(robot, EventKind.CALLS)]
-        calls = [*self._calls, *planned]
+        for robot in self._robots:
+            self._calls += notes_of(robot, EventKind.CALLS)
+        for call in self._calls:
+            column = call.step - first
+            if first <= call.step < end:
+                hearers = [pair for pair in self.pairs if pair.hears(call, column)]
+                self._ahead += [Encounter(column, "robot_calls", p.robot, p) for p in hearers]
         self._calls = []
-        self._ahead += [
-            Encounter(step - first, "robot_calls", pair.robot, pair)
-            for step, row, user in calls
-            if first <= step < end
-            for pair in self.pairs
-            if pair.robot.row == row and user in ("", pair.user.name) and pair.hears(step - first)
-        ]
         return min((event.column + first + 1 for event in self._ahead), default=end)
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Take in the steps up to `end` - 1."""
-        first, self.next_step, count = self.next_step, end, end - self.next_step
+        first = self.next_step
+        count = end - first
+        self.next_step = end
         self._last = []
         if not self.pairs or not count:
             return ()

@@ -10,7 +10,7 @@ import numpy as np
 from fleet2d.algorithms.history import SensorRow
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
-from fleet2d.artifacts.table import STEP, Column, time_column
+from fleet2d.artifacts.table import Column, moment_columns
 from fleet2d.configuration.units import MICROSECOND
 from fleet2d.engine.basis import Watcher
 from fleet2d.engine.intervention_queue import InterventionQueue
@@ -128,15 +128,17 @@ class RunExpectations(Watcher):
             "algorithms": list(self._scenario.algorithms),
             "metrics": list(self._scenario.metrics),
         }
+        looked_at = {by: cameras.other_names for by, cameras in self._run.cameras.items()}
+        metrics = self._scenario.metrics.items()
         return Scene(
             names,
-            {name: [o.name for o in c.others] for name, c in self._run.cameras.items()},
+            looked_at,
             possible_events(users, robots, home, self._run.doors, self._sensor_names),
             possible_details(users, robots, self._queue.acts),
             home.plan.bounds,
             (clock.steps - since) * clock.step_us * MICROSECOND,
             self._scenario.interactions,
-            {name: partial(limits_of, m) for name, m in self._scenario.metrics.items()},
+            {name: partial(limits_of, metric) for name, metric in metrics},
         )
 
     # Measuring
@@ -158,9 +160,10 @@ class RunExpectations(Watcher):
     def settle(self, end: int, observations: SightingTable, readings: Sequence[SensorRow]) -> None:
         """Measure the signals up to step `end` - 1; see `Watcher.settle`."""
         names = self._sensor_names
-        rest = [e for e in self._events if e.step >= end]
         states = [(row.step, names[row.sensor], row.on) for row in readings]
-        events = sorted((e for e in self._events if e.step < end), key=lambda e: (e.step, e.rank))
+        rest = [event for event in self._events if event.step >= end]
+        events = [event for event in self._events if event.step < end]
+        events.sort(key=lambda event: (event.step, event.rank))
         home = self._run.home
         bodies = self.bodies
         block = SignalBlock(self.first, end, bodies, home, observations, states, events)
@@ -200,7 +203,8 @@ class RunExpectations(Watcher):
         return evidence_of(entry.expectation, self._signals(entry, ended=True))
 
     def _signals(self, entry: ActiveExpectation, ended: bool) -> RunSignals:
-        gauges = {str(s): self._gauges[str(s)] for s in entry.expectation.measures()}
+        keys = map(str, entry.expectation.measures())
+        gauges = {key: self._gauges[key] for key in keys}
         traces = {key: gauge.trace() for key, gauge in gauges.items()}
         words = {key: gauge.words for key, gauge in gauges.items()}
         return RunSignals(traces, words, entry.since, self.first, ended, self.clock)
@@ -222,15 +226,18 @@ class RunExpectations(Watcher):
     def _store_violations(self, store: RunStore, verdicts: Mapping[str, Verdict]) -> None:
         """Store a row for each violation, in order of its first step."""
         names = tuple(sorted(verdicts))  # the keys of a manifest are sorted, too
-        rows = sorted((v, names.index(n)) for n, each in verdicts.items() for v in each.violations)
+        rows = sorted(
+            (violation, code)
+            for code, name in enumerate(names)
+            for violation in verdicts[name].violations
+        )
         step = np.array([violation.first for violation, _ in rows], np.int64)
         robustness = np.array([violation.robustness for violation, _ in rows])
         last = Column("last_step", "int64", description="last step of the violation")
         worst = Column("worst_step", "int64", description="the first at which it is worst")
         value = Column("robustness", "float64", nullable=True, description="missing: infinite")
         columns = {
-            STEP: step,
-            time_column(self.clock.zone): self.clock.stamps(step),
+            **moment_columns(self.clock, step),
             Column("expectation", "category", categories=names): [code for _, code in rows],
             last: [violation.last for violation, _ in rows],
             worst: [violation.worst for violation, _ in rows],

@@ -1,6 +1,7 @@
 """Heights of cameras, bodies and furniture: of a person behind a sofa one sees the head."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,8 @@ class BodyHeights:
         """
         own = self.tops[row]
         mounted = [HEAD * own[0] if c.height is None else 1000 * c.height for c in cameras]
-        shares = np.array([HEAD, *(AROUND[i % len(AROUND)] for i in range(points - 1))])
+        around = islice(cycle(AROUND), points - 1)
+        shares = np.array([HEAD, *around])
         looked_at = np.rint(self.tops[others, :, None] * shares).astype(np.int64)
         eyes = np.rint(np.outer(mounted, own / own[0])).astype(np.int64)
         return eyes, np.repeat(looked_at[None], len(mounted), axis=0), self.tops
@@ -70,13 +72,11 @@ def _stacked(home: Home) -> tuple[I64, I64, I64, I64]:
     """Return corners, start, boxes and top of all furniture; see `fleet2d.kernels.Heights`."""
     prisms = [prism for thing in home.objects for prism in prisms_of(home, thing)]
     outlines = [outline for outline, _ in prisms]
-    boxes = [np.concatenate([outline.min(axis=0), outline.max(axis=0)]) for outline in outlines]
-    return (
-        np.concatenate([np.zeros((0, 2), np.int64), *outlines]),
-        np.cumsum([0, *map(len, outlines)], dtype=np.int64),
-        np.array(boxes, np.int64).reshape(-1, 4),
-        _millimetres(np.array([height for _, height in prisms])),
-    )
+    corners = np.concatenate([np.zeros((0, 2), np.int64), *outlines])
+    starts = np.cumsum([0, *map(len, outlines)], dtype=np.int64)
+    bounds = [(outline.min(axis=0), outline.max(axis=0)) for outline in outlines]
+    heights = np.array([height for _, height in prisms])
+    return corners, starts, np.array(bounds, np.int64).reshape(-1, 4), _millimetres(heights)
 
 
 def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
@@ -86,7 +86,8 @@ def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
     blocks sight is a wall already.
     """
     model = FURNITURE.get(thing.type)
-    height = thing.height if thing.height is not None else model.height if model else 0.0
+    usual = model.height if model else 0.0
+    height = usual if thing.height is None else thing.height
     if thing.blocks == "sight" or height == 0:
         return
     footprint = lattice_footprint(home.plan, thing)
@@ -100,7 +101,8 @@ def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
     left = np.array([-sine(turn), cosine(turn)])
     forward = corners @ ahead // UNIT
     across = corners @ left // UNIT
-    depths = forward.min() - 1, forward.min() + round(BACK_M * home.plan.lattice.units_per_m)
+    back = forward.min()
+    depths = back - 1, back + round(BACK_M * home.plan.lattice.units_per_m)
     sides = across.min() - 1, across.max() + 1
     box = [(depth * ahead + side * left) // UNIT for depth in depths for side in sides]
     behind = shapely.MultiPoint(box).convex_hull

@@ -95,9 +95,9 @@ class Interruptions(Watcher):
         names = self._actors[row].plan.interrupts - WATCHED_EVENTS
         if not names and not self._held:
             return
-        others = {wait: held for wait, held in self._held.items() if wait[0] != row}
-        new = {(row, name): self._held.get((row, name)) for name in names}
-        self._held = dict(sorted((others | new).items(), key=lambda item: item[0]))
+        others = [wait for wait in self._held if wait[0] != row]
+        waits = sorted([*others, *((row, name) for name in names)])
+        self._held = {wait: self._held.get(wait) for wait in waits}
 
     def limit(self, bodies: Bodies, end: int) -> int:
         """Return the step after the first interruption, `end` if there is none."""
@@ -128,15 +128,15 @@ class Interruptions(Watcher):
     def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
         """Yield the interruptions at the last step, with the place of the body itself."""
         for row, name in self._last:
-            actor = self._actors[row]
-            x, y = actor.home.plan.lattice.xy_of(actor.state.x, actor.state.y)
+            x, y = self._actors[row].xy
             yield row, SightEvent(name, "", x, y)
 
     def _interrupt(self, name: str) -> Interrupt:
         if name not in self._interrupts:
-            interrupt = self._interrupts[name] = cast("Interrupt", lookup("interrupt", name)())
-            if not type(interrupt).__module__.startswith("fleet2d."):
-                self.files += source_files(type(interrupt))
+            kind = cast("type[Interrupt]", lookup("interrupt", name))
+            self._interrupts[name] = kind()
+            if not kind.__module__.startswith("fleet2d."):
+                self.files += source_files(kind)
         return self._interrupts[name]
 
     def _begins(self, wait: Wait) -> Bool:

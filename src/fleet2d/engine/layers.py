@@ -74,7 +74,7 @@ class LayerBook:
         needs = {need for learner in learners.values() for need in learner.needs}
         behaviors = [behavior for actor in basis.actors for behavior in actor.behaviors]
         needs |= {need for behavior in behaviors for need in behavior.needs}
-        names = {*needs, *(name for name in scenario.floorplan.layers if name in SEEN_LAYERS)}
+        names = needs | (scenario.floorplan.layers.keys() & SEEN_LAYERS)
         self._exposes = "exposure" in needs
         self._bin_steps = 0
         self._logged_bins = 0
@@ -109,7 +109,8 @@ class LayerBook:
         if not self._home.layers:  # a quick answer, as every span needs it
             return None
         periods = [self._period(layer) for layer in self._home.layers.values()]
-        return min((every * (step // every + 1) for every in periods if every), default=None)
+        dues = [every * (step // every + 1) for every in periods if every]
+        return min(dues, default=None)
 
     def keep(self, end: int) -> None:
         """Store the layers that are due after the step before `end`."""

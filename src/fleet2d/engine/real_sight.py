@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fleet2d.algorithms.observations import SightingTable
-from fleet2d.engine.cameras import Cameras, Look, SightSetup, newest_of
+from fleet2d.engine.cameras import Cameras, Look, SightSetup, end_of_span, newest_of
 from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.entity import SIGHTING, EvidenceSource, LiveDetections
@@ -35,7 +35,7 @@ class RealSight(Cameras):
         self.knows_truth = source.besides_cameras
         self.expect_disturbances()
         with blame(f"{self.owner.path}.perceives", None):
-            self.source.start(self.owner, [other.name for other in self.others])
+            self.source.start(self.owner, self.other_names)
         self.notes = self.source.notes
 
     def receive(self, step: int, sightings: Sequence[FalseSighting]) -> None:
@@ -43,16 +43,19 @@ class RealSight(Cameras):
         source = self.source
         lattice = self.owner.home.plan.lattice
         assert isinstance(source, LiveDetections)
-        index = {other.name: row for row, other in enumerate(self.others)} | {"": NOBODY}
+        index = self.identities
         rows = np.zeros((len(sightings), SIGHTING), np.int64)
-        places = np.array([(s.x, s.y) for s in sightings])
-        points = np.rint(places * lattice.units_per_m) if source.relative else None
+        places = np.array([(sighting.x, sighting.y) for sighting in sightings])
+        if source.relative:
+            points = np.rint(places * lattice.units_per_m).astype(np.int64)
+        else:
+            points = lattice.to_lattice(places)
         rows[:, Column.STEP] = step
         rows[:, Column.USER] = UNKNOWN_TRUTH
         rows[:, Column.IDENTITY] = [index[sighting.user] for sighting in sightings]
-        rows[:, [Column.X, Column.Y]] = lattice.to_lattice(places) if points is None else points
         rows[:, Column.HEADING] = [sighting.heading for sighting in sightings]
-        rows[:, Column.TRUE_X], rows[:, Column.TRUE_Y] = rows[:, Column.X], rows[:, Column.Y]
+        rows[:, [Column.X, Column.Y]] = points
+        rows[:, [Column.TRUE_X, Column.TRUE_Y]] = points
         source.receive(rows)
 
     def _look(self, bodies: Bodies, end: int, *, stop: bool = True) -> Look:
@@ -77,7 +80,7 @@ class RealSight(Cameras):
         patience = self.rule.patience
         events = sight_events(rows, SightMemory(*self.memory), patience, first, looked)
         stops = self.ends if stop else (False, False)
-        ends_at = next((step + 1 for step, _, kind in events if stops[kind]), looked)
+        ends_at = end_of_span(events, stops, looked)
         newest = newest_of(rows, len(self.memory.seen))
         return Look(looked, ends_at, SightingTable.of_rows(rows), newest, events, old_memory)
 

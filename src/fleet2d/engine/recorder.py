@@ -21,7 +21,7 @@ from fleet2d.algorithms.observations import (
     SightingTable,
     Truth,
 )
-from fleet2d.artifacts.table import STEP, Column, Columns, Repeated, TableSpec, time_column
+from fleet2d.artifacts.table import Column, Columns, Repeated, TableSpec, moment_columns
 from fleet2d.engine.basis import Basis, ImmutableRows
 from fleet2d.engine.cameras import NOTHING, Cameras
 from fleet2d.engine.sensors import Sensors
@@ -102,9 +102,11 @@ class Recorder:
         self._readings = list[SensorRow]()
         self._rooms = NearestRooms(basis.home.plan)
         self._camera_names = camera_names(cameras)
-        named = cameras if self._camera_names else ()
-        codes = {name: code for code, name in enumerate(self._camera_names)}
-        self._camera_codes = {group.index: [codes[name] for name in group.names] for group in named}
+        self._camera_codes: dict[int, list[int]] = {}
+        if self._camera_names:
+            for group in cameras:
+                codes = [self._camera_names.index(name) for name in group.names]
+                self._camera_codes[group.index] = codes
         self._has_unknown_truth = not all(group.knows_truth for group in cameras)
         self._count = 0  # observations and readings
         self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
@@ -156,9 +158,8 @@ class Recorder:
         """Collect events."""
         if "events" in self._tables:
             self._events += events
-        begun = [
-            event for event in events if event[2] == EventKind.ACTIVITY and event[1] in self._users
-        ]
+        activities = [event for event in events if event[2] == EventKind.ACTIVITY]
+        begun = [event for event in activities if event[1] in self._users]
         if not self.activities.are_perceived:  # then only the present one is asked for
             begun = list({event[1]: event for event in begun}.values())
         for step, entity, _, detail in begun:
@@ -213,14 +214,12 @@ class Recorder:
         size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), None)
         seen = SightingTable.joined(self._observations[:size] or [NOTHING])
         del self._observations[:size]
-        columns: Columns = {
-            STEP: seen.step,
-            time_column(self.clock.zone): self.clock.stamps(seen.step),
-        }
+        columns = moment_columns(self.clock, seen.step)
         # Most rows repeat another one at another step: all other columns are made of the others.
         index = seen.index.astype(np.int64)
         o = self._seen(SightingTable.of_rows(seen.distinct))
-        columns |= {c: Repeated(values, index) for c, values in self._columns_of(o).items()}
+        for column, values in self._columns_of(o).items():
+            columns[column] = Repeated(values, index)
         if self._camera_names and self.activities.are_perceived:
             o = self._seen(seen)
             activity = Column("activity", "category", nullable=True, description=ACTIVITY_SAID)
@@ -282,21 +281,22 @@ class Recorder:
             order = order[rows[order] >= 0]
             if UNSTORED not in self.store.manifest.notes:
                 self.store.manifest.notes.append(UNSTORED)
-        kinds, details = ([column[i] for i in order.tolist()] for column in (kind, detail))
+        ordered = order.tolist()
+        kinds = [str(kind[i]) for i in ordered]
+        details = [detail[i] for i in ordered]
         of_users = [i for i, name in enumerate(kinds) if name in USER_EVENTS]
         user = np.full(len(kinds), -1, np.int32)
         user[of_users] = [self._users.get(details[i], -1) for i in of_users]
         for i in of_users:
             details[i] = ""
-        columns: Columns = {
-            STEP: steps[order],
-            time_column(self.clock.zone): self.clock.stamps(steps[order]),
-            self._event_entity: rows[order],
-            Column("event", "category"): list(map(str, kinds)),
-        }
+        columns = moment_columns(self.clock, steps[order])
+        columns[self._event_entity] = rows[order]
+        columns[Column("event", "category")] = kinds
         if self._users:
-            columns[Column("user", "category", nullable=True, categories=self._user_names)] = user
-        return columns | {Column("detail", "string"): details}
+            user_column = Column("user", "category", nullable=True, categories=self._user_names)
+            columns[user_column] = user
+        columns[Column("detail", "string")] = details
+        return columns
 
     def _drain_decisions(self) -> Columns:
         # A body that gives way at the step of its decision decides twice: the last one counts.
@@ -311,8 +311,7 @@ class Recorder:
         behaviors = [name or None for name in behavior]
         next_steps = np.ma.array([at or 0 for at in next_step], np.int64, mask=missing)
         return {
-            STEP: steps,
-            time_column(self.clock.zone): self.clock.stamps(steps),
+            **moment_columns(self.clock, steps),
             self._entity: np.array(row, np.int32),
             Column("behavior", "category", nullable=True, description=who): behaviors,
             Column("reason", "string", description="the last note of the plan"): list(reason),
@@ -330,8 +329,7 @@ class Recorder:
         names = tuple(self._sensors.names)
         said = "what the person does, if known"
         return {
-            STEP: steps,
-            time_column(self.clock.zone): self.clock.stamps(steps),
+            **moment_columns(self.clock, steps),
             Column("room", "category"): [rooms[number] for number in sensor],
             Column("sensor", "category", categories=names): np.array(sensor, np.int32),
             Column("state", "category"): states,

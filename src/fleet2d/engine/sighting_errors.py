@@ -94,7 +94,8 @@ class Darkness(PerceptionError):
             shares = self.unlit.around_the_clock().chances(sightings.hour.tolist()) / ONE
         else:
             elapsed_us = sightings.step * round(1e6 * sightings.step_s)
-            by_day = self.sun.shares(readings_of(sightings.start, elapsed_us).astype("M8[us]"))
+            times = readings_of(sightings.start, elapsed_us).astype("M8[us]")
+            by_day = self.sun.shares(times)
             shares = DARKEST + (1 - DARKEST) * by_day
         is_hidden = is_dark & (sightings.uniform("noticed") >= shares)
         return sightings.replace(noticed=sightings.noticed & ~is_hidden)
@@ -131,14 +132,14 @@ class SightingErrors:
         self._row = cameras.row
         self._drift = cameras.drift
         self._lenses = cameras.lenses
-        self._users = tuple(other.name for other in cameras.others)
+        self._users = tuple(cameras.other_names)
         common = getattr(owner.entity, "perception", None)
-        only = "camera" in cameras.names
         self._cameras = []
         self.events = sight_events
         for name, perception in zip(cameras.names, perceptions, strict=True):
-            part = "" if perception is common else ".camera" if only else f".cameras.{name}"
-            path = f"{owner.path}{part}.perception.errors"
+            camera = "camera" if "camera" in cameras.names else f"cameras.{name}"
+            place = owner.path if perception is common else f"{owner.path}.{camera}"
+            path = f"{place}.perception.errors"
             errors = dict(sorted(perception.errors.items())) if perception else {}
             detection = perception.detection if perception else Detection()
             sun = owner.clock.sun if detection.unlit == DARK_NIGHT else None

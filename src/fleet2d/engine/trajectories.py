@@ -3,9 +3,10 @@
 From key frames, which are few, all poses of a run can be rebuilt.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fleet2d.artifacts.table import (
     KEY_KINDS,
@@ -15,6 +16,7 @@ from fleet2d.artifacts.table import (
     WALK,
     Column,
     Columns,
+    moment_columns,
     time_column,
 )
 from fleet2d.configuration.units import whole_steps
@@ -57,12 +59,10 @@ class Samples:
         self._room = room_column(basis)
         self._home = basis.home
         every = basis.scenario.artifacts.trajectories
-        named = {"off": 0, "every step": 1}
-        self._every = (
-            named[every]
-            if isinstance(every, str)
-            else whole_steps(every, self._clock.step_us, "artifacts.trajectories")
-        )
+        if isinstance(every, str):
+            self._every = {"off": 0, "every step": 1}[every]
+        else:
+            self._every = whole_steps(every, self._clock.step_us, "artifacts.trajectories")
         self._blocks: list[I64] = []
         self.count = 0
 
@@ -100,8 +100,7 @@ class Samples:
         room = plan.room_of_place[y // SUB, x // SUB].astype(np.int32)
         away_text = "not at home: x, y and room are missing"
         return {
-            STEP: step,
-            time_column(self._clock.zone): self._clock.stamps(step),
+            **moment_columns(self._clock, step),
             self._entity: entity.astype(np.int32),
             X: xy[:, 0],
             Y: xy[:, 1],
@@ -134,6 +133,10 @@ class KeySegment(NamedTuple):
     row: int
     kind: int
     step: int = -1
+
+    def columns(self) -> list[NDArray[Any]]:
+        """Return time, x, y, heading and away of its key frames."""
+        return [column[self.begin : self.end] for column in self.track]
 
 
 class KeyFrames:
@@ -261,14 +264,15 @@ class KeyFrames:
         segments = self._segments
         self._segments = ImmutableRows()
         self._rows = 0
-        parts = [NO_FRAMES, *([column[s.begin : s.end] for column in s.track] for s in segments)]
-        time, x, y, heading, away = (np.concatenate(column) for column in zip(*parts, strict=True))
-        numbers = np.array([(s.row, s.kind, s.step) for s in segments], np.int64).reshape(-1, 3)
-        counts = [s.end - s.begin for s in segments]
+        parts = [NO_FRAMES, *(segment.columns() for segment in segments)]
+        time, x, y, heading, away = map(np.concatenate, zip(*parts, strict=True))
+        marks = [(segment.row, segment.kind, segment.step) for segment in segments]
+        counts = [segment.end - segment.begin for segment in segments]
+        numbers = np.array(marks, np.int64).reshape(-1, 3)
         entity, kind, step = np.repeat(numbers, counts, axis=0).T
         step = np.where(step < 0, -(-time // self._clock.step_us), step)
         order = np.lexsort((entity, step))
-        xy = self._home.plan.lattice.to_metres(np.stack([x, y], axis=1)[order])
+        xy = self._home.plan.lattice.to_metres(np.column_stack([x, y])[order])
         away_text = "not at home: x and y are where it left"
         return {
             STEP: step[order],

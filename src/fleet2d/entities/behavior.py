@@ -258,8 +258,7 @@ class Situation:
     @property
     def xy(self) -> tuple[float, float]:
         """Where the body is [m]."""
-        state = self.actor.state
-        return self.home.plan.lattice.xy_of(state.x, state.y)
+        return self.actor.xy
 
     @property
     def room(self) -> Room | None:

@@ -516,6 +516,11 @@ class Body:
             return approach
         return space.nearest(*approach, self.part) or approach
 
+    @property
+    def xy(self) -> tuple[float, float]:
+        """Where it is [m]."""
+        return self.home.plan.lattice.xy_of(*self.state.position)
+
     def stream(self, purpose: str) -> np.uint64:
         """Return the key of its random stream for a purpose."""
         return stream_key(self.seed, self.path, purpose)

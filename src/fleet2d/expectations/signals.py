@@ -183,8 +183,10 @@ class MeasuredCameras(Protocol):
 
     index: int
     """The number of the owner among the robots, or among the users."""
-    others: Sequence[Actor]
-    """The bodies that they look at, by their numbers."""
+
+    @property
+    def other_names(self) -> Sequence[str]:
+        """The names of the bodies that they look at, by their numbers."""
 
     @property
     def in_view(self) -> Mapping[str, object]:

@@ -540,7 +540,7 @@ class perceived(_CameraCondition):
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return the numbers of the robot and the user in observations."""
         cameras = run.cameras[self.by]
-        return cameras.index, [other.name for other in cameras.others].index(self.body)
+        return cameras.index, cameras.other_names.index(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the number of observations at each step at which there is one."""

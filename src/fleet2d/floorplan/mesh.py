@@ -290,10 +290,9 @@ class Gates:
         >>> gate = ((320, 0), (320, 640))
         >>> mesh = build_mesh([shapely.box(0, 0, 640, 640)], 10, 10, corners=gate)
         >>> gates = Gates(mesh, [gate])
-        >>> from fleet2d.kernels import locate
         >>> from fleet2d.kernels import line_of_sight
         >>> for walls in (gates.mesh, gates.shut({0})):
-        ...     line_of_sight(walls, 11, 11, locate(walls, 11, 11), 631, 11)
+        ...     line_of_sight(walls, 11, 11, 631, 11)
         True
         False
     """
