@@ -127,7 +127,7 @@ CASES = {
         },
         """
         always(distance(butler, ana) >= 0.35)
-        eventually(events(gives_way, butler, detail=ana))
+        eventually(events(gives_way, butler, detail=ana) and during(07:02-07:03))
         after(events(gives_way, butler), events(gives_up, butler, detail=ana), within=1 h)
         """,
     ),
