@@ -149,7 +149,7 @@ class Learners:
             output: The output; FROZEN: its present one; WITHHELD: none; None: its real outputs
                 again.
         """
-        self.replaced = {key: value for key, value in self.replaced.items() if key != name}
+        self.replaced.pop(name, None)
         if _is_marked(output, FROZEN):
             output = self.outputs.get(name, WITHHELD)
         if output is not None:
@@ -173,17 +173,19 @@ class Learners:
             step: The step.
             keeps: Whether an algorithm, by its name, keeps what it has learned.
         """
+        self.outputs = dict(self.outputs)  # a new mapping: others may hold the old one
         for learner in self.all:
             old = learner.component
-            if not isinstance(old, Algorithm) or (keeps(learner.name) and not old.is_real_time):
+            is_kept = keeps(learner.name)
+            if not isinstance(old, Algorithm) or (is_kept and not old.is_real_time):
                 continue
             learned = getattr(learner.origin, "learned", None)
             learner.component = self._start(learner.path, learner.origin, learned)
-            if keeps(learner.name) and isinstance(learner.component, Algorithm):
+            if is_kept and isinstance(learner.component, Algorithm):
                 with blame(learner.path, step):
                     learner.component.recall(old.long_term_state())
             learner.known_from = step
-            self.outputs = {name: o for name, o in self.outputs.items() if name != learner.name}
+            self.outputs.pop(learner.name, None)
         self._show_outputs()
 
     def _start(
@@ -216,14 +218,16 @@ class Learners:
                 learner.is_updated = True
                 component = learner.component  # metrics come last, and read all
                 reads = component.reads if isinstance(component, Algorithm) else fresh
-                inputs = {**self.outputs, **{name: fresh[name] for name in reads if name in fresh}}
+                newer = {name: fresh[name] for name in reads if name in fresh}
+                inputs = {**self.outputs, **newer}
                 if isinstance(component, Algorithm):
                     inputs = dict(self._as_read(inputs))
                 output = self._update(learner, end, log, inputs)
                 learner.since = end
                 if isinstance(learner.component, Algorithm) and output is not None:
                     fresh[learner.name] = _copy(output)
-        self.fresh, self._due = fresh, self._earliest_due()
+        self.fresh = fresh
+        self._due = self._earliest_due()
         self.outputs = {**self.outputs, **fresh}  # a new mapping: others may hold the old one
         self._show_outputs()
 
@@ -302,15 +306,16 @@ class Learners:
         history = History(
             log, learner.since, end, step_s, visible, learner.oldest, needs, learner.known_from
         )
+        last = end - 1
         state = Present(
-            learner.path, end - 1, self.clock.time(end - 1), self.clock.start, self.home,
+            learner.path, last, self.clock.time(last), self.clock.start, self.home,
             self.users, self.robots, Outputs({**outputs}, self.known), self.seed
         )  # fmt: skip
-        with blame(learner.path, end - 1):
+        with blame(learner.path, last):
             output = learner.component.update(history, state)
             if output is not None:
                 columns = to_columns(output, self._room_names, learner.path)
-                self._store(learner, end - 1, columns)
+                self._store(learner, last, columns)
         return output
 
     def _store(self, learner: Learner, step: int, columns: dict[str, NDArray[Any]]) -> None:
@@ -323,7 +328,8 @@ class Learners:
             learner.kinds = kinds
             own = (Column(name, kind) for name, kind in kinds.items())
             time = replace(time_column(self.clock.zone), description="")
-            learner.spec = TableSpec(learner.table, (Column("step", "step"), time, *own))
+            columns_of_table = (Column("step", "step"), time, *own)
+            learner.spec = TableSpec(learner.table, columns_of_table)
         _check_kinds(learner, kinds)
         self.store.add_table(learner.spec)  # that of a branch doesn't have it yet
         self.store.append(learner.table, step=step, time=self.clock.stamp(step), **columns)

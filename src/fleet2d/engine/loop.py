@@ -150,7 +150,8 @@ def _asked(state: State, step: int) -> Sequence[int]:
     rows = state.bodies.due(step)
     if not state.steering:
         return rows
-    return sorted({*rows, *(row for watcher in state.steering for row in watcher.steered)})
+    steered = (watcher.steered for watcher in state.steering)
+    return sorted({*rows}.union(*steered))
 
 
 def _follow_plan(state: State, row: int) -> None:
@@ -186,17 +187,23 @@ def move(state: State, span: Span) -> None:
     end = min(span.end, state.bodies.next_decision(), state.settled + state.capacity)
     if state.max_span is not None:
         end = min(end, span.first + state.max_span)
-    queues = state.learners, state.changes, state.interventions
-    clock_change = state.changes.clock.next_change(span.first)
-    dues = *[queue.next_due() for queue in queues], clock_change
-    for due in (state.layers.next_due(span.first), *dues):
+    dues = (
+        state.layers.next_due(span.first),
+        state.learners.next_due(),
+        state.changes.next_due(),
+        state.interventions.next_due(),
+        state.changes.clock.next_change(span.first),
+    )
+    for due in dues:
         if due is not None:
             end = min(end, max(due, span.first + 1))
     awaited = state.learners.awaited | state.awaited
     if awaited:
         noted = state.next_note(span.first, awaited)
         emitted = state.events.next_awaited(span.first)
-        end = min(end, *(step + 1 for step in (noted, emitted) if step is not None), end)
+        for step in (noted, emitted):
+            if step is not None:
+                end = min(end, step + 1)
     span.end = end
 
 

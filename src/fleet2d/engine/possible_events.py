@@ -99,15 +99,17 @@ def possible_details(
         details[EventKind.CALLED] = ["dock", *calls]
     details |= dict.fromkeys(ABOUT_ROBOTS, names)
     for robot in robots:
-        wanted = {} if robot.requests is None else robot.requests.interactions
-        for name, interaction in wanted.items() if not is_own(robot) else ():
+        if robot.requests is None or is_own(robot):
+            continue
+        for name, interaction in robot.requests.interactions.items():
             texts = [f"{name} {person}" for person in interaction.people]
             for kind in OF_REQUESTS:
                 key = f"{kind} {robot.name}"
-                details[key] = [*details.get(key, []), *texts]
+                details.setdefault(key, []).extend(texts)
     for user in users:
         # A log may hold any activities, and so may a class of the user's own.
-        if not is_own(user) and "replay" not in {b.type_name for b in user.behaviors}:
+        types = [behavior.type_name for behavior in user.behaviors]
+        if not is_own(user) and "replay" not in types:
             told = [a["what"] for a in acts if a["do"] == "activity" and a["entity"] == user.name]
             known = [name for behavior in user.behaviors for name in behavior.activities()]
             details[f"{EventKind.ACTIVITY} {user.name}"] = [*known, *told]

@@ -50,8 +50,7 @@ def switch_on(state: State, actor: DecidingActor, step: int) -> bool:
     state.settle(step)
     _set_charge_off(actor, step, is_off=False)
     power = power_of(actor.entity)
-    robots = state.actors[state.bodies.users :]
-    if all(robot.is_off for robot in robots if robot is not actor):
+    if all(robot.is_off for robot in state.robots if robot is not actor):
         state.learners.reboot(step, power.keeps)
     for area in state.layers.areas:
         if area.row == actor.row and not power.keeps(MAP):

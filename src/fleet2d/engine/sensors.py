@@ -79,8 +79,11 @@ class Sensors(Watcher):
     @property
     def notes(self) -> list[str]:
         """Remarks on the tables of replayed sensors."""
-        notes = {name: getattr(sensor, "notes", ()) for name, sensor in self.sensors.items()}
-        return [f"objects.{name}: {note}" for name in notes for note in notes[name]]
+        return [
+            f"objects.{name}: {note}"
+            for name, sensor in self.sensors.items()
+            for note in getattr(sensor, "notes", ())
+        ]
 
     @property
     def on(self) -> dict[str, bool]:
@@ -117,10 +120,14 @@ class Sensors(Watcher):
             return ()
         with blame("objects", first):
             view = self._view(bodies.block(first, end), first)
-            of_each = [self._read(name, each, view, end) for name, each in self._states.items()]
-        readings = [(i, reading) for i, of_one in enumerate(of_each) for reading in of_one]
+            readings = [
+                (number, reading)
+                for number, (name, state) in enumerate(self._states.items())
+                for reading in self._read(name, state, view, end)
+            ]
         # By step, then by sensor.
-        self._readings += sorted(readings, key=lambda item: (item[1].step, item[0]))
+        readings.sort(key=lambda item: (item[1].step, item[0]))
+        self._readings += readings
         return ()
 
     def _read(
@@ -149,10 +156,11 @@ class Sensors(Watcher):
 
     def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
         """Return readings as events, with the sensor and its state in the words of the table."""
-        names = self.names
-        words = self.words
-        kind = EventKind.SENSOR
-        return [Event(r.step, names[r.sensor], kind, words[r.sensor][not r.on]) for r in rows]
+        events = []
+        for row in rows:
+            word = self.words[row.sensor][not row.on]
+            events.append(Event(row.step, self.names[row.sensor], EventKind.SENSOR, word))
+        return events
 
     def take_events(self, events: Sequence[Event]) -> None:
         """Record the activities of users, for the readings."""

@@ -161,7 +161,8 @@ def _schedule_script(state: State, scenario: Scenario) -> None:
     from fleet2d.engine.world import schedule_script  # few runs need it
 
     # Entries that wait for an event come last: another entry may cause the event.
-    for index, entry in sorted(enumerate(scenario.script), key=lambda i: i[1].on is not None):
+    entries = sorted(enumerate(scenario.script), key=lambda item: item[1].on is not None)
+    for index, entry in entries:
         path = f"script.{index}"
         errors = PlacementError, ScenarioError
         with _locate_errors(scenario, path), errors_as(None, path, of=errors):
@@ -189,13 +190,14 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
         method.start(home)
     if sight.people_occlude:
         units = home.plan.lattice.units_per_m
-        radii = np.array([max(round(actor.entity.radius * units), 1) for actor in actors], np.int64)
+        sizes = [round(actor.entity.radius * units) for actor in actors]
+        radii = np.maximum(np.array(sizes, np.int64), 1)
     if sight.heights:
         from fleet2d.engine.heights import BodyHeights  # few runs need it
 
         heights = BodyHeights(actors)
-    compiled = isinstance(method, LineOfSight)
-    shared = SightSetup(actors, users, None if compiled else method, radii, heights)
+    own_method = None if isinstance(method, LineOfSight) else method
+    shared = SightSetup(actors, users, own_method, radii, heights)
     cameras = [_cameras_of(row, shared) for row, actor in enumerate(actors) if actor.entity.eyes]
     return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
 
@@ -265,32 +267,33 @@ def _locate_errors(scenario: Scenario, path: str) -> Iterator[None]:
 def _check_reads(scenario: Scenario, actors: list[DecidingActor]) -> None:
     """Refuse behaviors that read an unknown algorithm, or listen to an unknown event."""
     for actor in actors:
-        for name in sorted({name for b in actor.behaviors for name in b.listens} - WATCHED_EVENTS):
+        heard = frozenset().union(*(behavior.listens for behavior in actor.behaviors))
+        for name in sorted(heard - WATCHED_EVENTS):
             with errors_as(ScenarioError, f"{actor.path} listens to {name!r}", of=ComponentError):
                 actor.entity.check_interrupt(name)
-        for name in (name for behavior in actor.behaviors for name in behavior.reads()):
-            check_known(name, "algorithm", scenario.algorithms, where=f"{actor.path}: ")
+        for behavior in actor.behaviors:
+            for name in behavior.reads():
+                check_known(name, "algorithm", scenario.algorithms, where=f"{actor.path}: ")
 
 
 def _remember(state: State, basis: Basis) -> None:
     """Give robots a memory of their sightings if one of their behaviors needs it."""
     for actor in basis.robots:
         cameras = next((group for group in state.cameras if group.owner is actor), None)
+        remembered = [] if cameras is None else cameras.remembered
         if actor.rules is not None and actor.rules.minds_sleep:
             from fleet2d.entities.keep_out import SleepMemory
 
             beliefs = SleepMemory(basis.home.plan)
             actor.sleepers = Recall(state, cameras, beliefs)
-            if cameras is not None:
-                cameras.remembered.append(beliefs)
+            remembered.append(beliefs)
         if not any(behavior.remembers for behavior in actor.behaviors):
             continue
         from fleet2d.entities.robots.policy import SightingMemory  # few robots need it
 
         memory = SightingMemory(basis.home.plan, len(basis.users), basis.clock)
         actor.recall = Recall(state, cameras, memory)
-        if cameras is not None:
-            cameras.remembered.append(memory)
+        remembered.append(memory)
 
 
 def _log(
@@ -299,8 +302,9 @@ def _log(
     names = [actor.name for actor in basis.actors]
     log = Log(basis.home, basis.clock, names, basis.bodies, recorder.activities)
     log.cameras = [(group.index, name) for group in cameras for name in group.names]
-    behaviors = [(user.name, behavior) for user in basis.users for behavior in user.behaviors]
-    log.untracked = frozenset(name for name, b in behaviors if EventKind.UNKNOWN in b.records)
+    log.untracked = frozenset(
+        user.name for user in basis.users if user.may_record(EventKind.UNKNOWN)
+    )
     for each in conversations:
         log.answers = each.log
         log.wanted = each.wanted

@@ -261,8 +261,11 @@ class Simulation:
     @property
     def algorithms(self) -> dict[str, Algorithm]:
         """The algorithms in the run, by name: configuration and learned state."""
-        pairs = ((each.name, each.component) for each in self._state.learners.all)
-        return {name: component for name, component in pairs if isinstance(component, Algorithm)}
+        return {
+            learner.name: learner.component
+            for learner in self._state.learners.all
+            if isinstance(learner.component, Algorithm)
+        }
 
     def events(self, since: int = 0) -> list[Event]:
         """Return the events from a step on, up to the present one, in order.
@@ -328,12 +331,13 @@ class Simulation:
 
     def _event_kinds(self) -> frozenset[str]:
         """Return the kinds of events that may happen in this run."""
-        behaviors = (b for actor in self._state.actors for b in actor.behaviors)
-        return frozenset({*EventKind}.union(*(behavior.records for behavior in behaviors)))
+        behaviors = (behavior for actor in self._state.actors for behavior in actor.behaviors)
+        own = (behavior.records for behavior in behaviors)
+        return frozenset[str](EventKind).union(*own)
 
     def _state_of(self, actor: DecidingActor) -> dict[str, Any]:
         state = actor.state
-        x, y = self.home.plan.lattice.to_metres([state.x, state.y]).tolist()
+        x, y = actor.xy
         room = None if state.away else self.home.plan.room_at(x, y)
         return {
             "x": x,

@@ -76,12 +76,11 @@ class RecentEvents(deque[Event]):
 
     def __setstate__(self, state: tuple[bytes, list[str]]) -> None:
         """Restore the events."""
-        values = array("q", state[0])
-        texts = state[1]
-        count = len(values) // len(Event._fields)
-        steps, *columns = (values[k * count : (k + 1) * count] for k in range(len(Event._fields)))
-        codes = (map(texts.__getitem__, column) for column in columns)
-        self.extend(map(new_event, zip(steps, *codes, strict=True)))
+        numbers, texts = state
+        columns = np.frombuffer(numbers, np.int64).reshape(len(Event._fields), -1)
+        steps, *codes = columns.tolist()
+        words = (map(texts.__getitem__, column) for column in codes)
+        self.extend(map(new_event, zip(steps, *words, strict=True)))
 
 
 class EventStream:
@@ -166,7 +165,8 @@ class EventStream:
                 f"events from step {self._first_step} on are kept, not from step {step}: ask"
                 " more often, or read the table 'events'"
             )
-        return sorted((e for e in self._recent if e.step >= step), key=lambda e: (e.step, e.rank))
+        events = [event for event in self._recent if event.step >= step]
+        return sorted(events, key=lambda event: (event.step, event.rank))
 
 
 def capacity_of(actors: int) -> int:
@@ -244,6 +244,16 @@ class State:
         self.steering = [watcher for watcher in self.watchers if watcher.steered]
         self.listening = [watcher for watcher in self.watchers if watcher.hears_plans]
 
+    @property
+    def users(self) -> list[DecidingActor]:
+        """The users."""
+        return self.actors[: self.bodies.users]
+
+    @property
+    def robots(self) -> list[DecidingActor]:
+        """The robots."""
+        return self.actors[self.bodies.users :]
+
     def find(self, kind: type[W]) -> W | None:
         """Return the watcher of a kind; None if the run needs none."""
         return next((watcher for watcher in self.watchers if isinstance(watcher, kind)), None)
@@ -267,7 +277,8 @@ class State:
         from fleet2d.expectations.signals import MeasuredRun
 
         if self.expectations is None:
-            cameras = {c.owner.name: c for c in [*self.user_cameras, *self.cameras]}
+            groups = [*self.user_cameras, *self.cameras]
+            cameras = {group.owner.name: group for group in groups}
             sensors = self.find(Sensors)
             run = MeasuredRun(
                 self.actors,
@@ -321,13 +332,14 @@ class State:
         begin = self.notes_emitted[row]
         notes = actor.plan.notes
         step_us = actor.clock.step_us
-        name = actor.name
-        if begin == len(notes) or notes[begin].time_us > step * step_us:
+        now_us = step * step_us
+        if begin == len(notes) or notes[begin].time_us > now_us:
             return ()
         end = begin + 1
-        while end < len(notes) and notes[end][0] <= step * step_us:
+        while end < len(notes) and notes[end].time_us <= now_us:
             end += 1
         self.notes_emitted[row] = end
+        name = actor.name
         due = notes[begin:end]
         return [new_event((-(-time // step_us), name, kind, text)) for time, kind, text in due]
 

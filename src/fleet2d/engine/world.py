@@ -59,12 +59,12 @@ class EngineWorld:
     @cached_property
     def users(self) -> dict[str, DecidingActor]:
         """The people, by name."""
-        return {actor.name: actor for actor in self._state.actors[: self._state.bodies.users]}
+        return {actor.name: actor for actor in self._state.users}
 
     @cached_property
     def robots(self) -> dict[str, DecidingActor]:
         """The robots, by name."""
-        return {actor.name: actor for actor in self._state.actors[self._state.bodies.users :]}
+        return {actor.name: actor for actor in self._state.robots}
 
     @property
     def acts(self) -> Sequence[Mapping[str, Any]]:
@@ -93,7 +93,8 @@ class EngineWorld:
         for cameras in self._state.cameras:
             if cameras.row == row:
                 cameras.disturb(disturbances)
-        dark = {name for name in eyes if any(d.dark and d.is_of(name) for d in disturbances)}
+        darkness = [disturbance for disturbance in disturbances if disturbance.dark]
+        dark = {name for each in darkness for name in eyes if each.is_of(name)}
         for area in self._state.layers.areas:
             if area.row == row:
                 area.darken(dark)

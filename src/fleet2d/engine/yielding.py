@@ -117,7 +117,7 @@ class Yielding(Watcher):
         self._rule = settings.right_of_way
         self._users = basis.bodies.users
         robots = () if settings.ghosts or len(self._actors) < 2 else basis.robots
-        self.rows = [r.row for r in robots if not any(b.is_recorded for b in r.behaviors)]
+        self.rows = [robot.row for robot in robots if not robot.is_recorded]
         self._number = {row: number for number, row in enumerate(self.rows)}
         self._rows = np.array(self.rows, np.int64)
         self._step_us = basis.clock.step_us
@@ -128,9 +128,8 @@ class Yielding(Watcher):
         self._tries = np.array([self._steps(wait) for wait in WAITS], np.int64)
         self._tries_aside = np.array([self._steps(wait) for wait in WAITS_ASIDE], np.int64)
         self._waits: dict[int, GivenWay] = {}
-        self._looked_round: dict[
-            int, tuple[int, object]
-        ] = {}  # when, and where, there was no way round
+        # When, and where, there was no way round.
+        self._looked_round: dict[int, tuple[int, object]] = {}
         self._told: dict[tuple[int, int], int] = {}
         self._patience: dict[tuple[int, int], Patience] = {}
         self._pauses: dict[int, Patience] = {}  # of robots that stand as they found nothing better
@@ -164,9 +163,9 @@ class Yielding(Watcher):
         step = self.next_step
         first = step + 1
         while first < end:
-            changes = list(self._changes())
+            changes = [change for change in self._changes() if change > step]
             until = min([end, *(change for change in changes if change > first)])
-            is_same = all(not step < change <= first for change in changes)
+            is_same = all(change > first for change in changes)
             kept = self._present(step) if is_same else self._kept(first)
             found = self._meetings(kept, first, until)
             if found:
@@ -244,17 +243,16 @@ class Yielding(Watcher):
         self._strangers[:, self._rows] = -1
         self._reach = self._near + SUB  # with room to move
         self._alone = np.full(touch.shape, OWN, np.uint8)
-        both = np.zeros_like(self._alone)
-        self._counts = both.copy()
-        polite = self._near.copy()
+        self._counts = np.zeros_like(self._alone)
+        self._polite = self._near.copy()
+        people = slice(self._users)
         for number, row in enumerate(self.rows):
             gives_way = getattr(actors[row].entity, "gives_way", None)
             if gives_way is not None:  # `Clearance` lets it mind people that stand
-                self._counts[number, : self._users] = OTHERS
-                polite[number, : self._users] = lattice(gives_way.distance)[number, : self._users]
-        self._polite = polite
+                self._counts[number, people] = OTHERS
+                self._polite[number, people] = lattice(gives_way.distance)[number, people]
         self._passing = self._each(self._near, self._nothing)
-        self._politely = self._each(polite, self._nothing)
+        self._politely = self._each(self._polite, self._nothing)
         self._everybody = self._each(self._near, self._hard)
         self._same_place = SAME_PLACE_M * units
         self._order()
@@ -317,7 +315,9 @@ class Yielding(Watcher):
         near = usual.near.copy()
         hard = usual.hard.copy()
         counts = usual.counts.copy()
-        for row in [row for row, pause in self._pauses.items() if pause.until > step]:
+        for row, pause in self._pauses.items():
+            if pause.until <= step:
+                continue
             i = self._number[row]
             lead[i, self._rows] = 0
             near[i, self._rows] = self._least[i, self._rows]
@@ -391,17 +391,18 @@ class Yielding(Watcher):
 
     def _swap(self, row: int, other: int, step: int) -> None:
         """Let the other one of two robots yield for a while."""
-        pair = min(row, other), max(row, other)
-        swapped_until = self._swapped.get(pair)
-        if swapped_until is None:
-            self._swapped[pair] = step + self._steps(SWAPPED_FOR)
-        elif step - (swapped_until - self._steps(SWAPPED_FOR)) < self._steps(DEADLOCK):
+        pair = _pair(row, other)
+        lasts = self._steps(SWAPPED_FOR)
+        until = self._swapped.get(pair)
+        if until is None:
+            self._swapped[pair] = step + lasts
+        elif step < until - lasts + self._steps(DEADLOCK):
             return  # else two robots that are both blocked would swap it there and back
         else:
             del self._swapped[pair]
-        for key in ((row, other), (other, row)):
-            self._patience.pop(key, None)
-            self._pauses.pop(key[0], None)
+        for one, another in ((row, other), (other, row)):
+            self._patience.pop((one, another), None)
+            self._pauses.pop(one, None)
         self._distances = None
 
     # Plans
@@ -464,9 +465,9 @@ class Yielding(Watcher):
         last, where = self._looked_round.get(actor.row, (None, None))
         if last is not None and (now.step - last < self._ahead or where == seen):
             return None
-        around = plan_around(
-            now, actor.plan, self._bodies.timelines, standing, at, _charger(actor), self._beat_us
-        )
+        timelines = self._bodies.timelines
+        charger = _charger(actor)
+        around = plan_around(now, actor.plan, timelines, standing, at, charger, self._beat_us)
         if around is not None and self._is_free(now, around):
             return around
         self._looked_round[actor.row] = now.step, None if around is not None else seen
@@ -517,10 +518,11 @@ class Yielding(Watcher):
             reach=self._reach[self._number[actor.row]],
         )
         body = yielder(actor, self._beat_us)
+        waits = self._tries_aside
         rests = self._free_for
-        continued = self._bodies.timelines.way_aside(
-            body, now.step, at, aside, self._tries_aside, rests, kept, self._far(now)
-        )
+        until = self._far(now)
+        way_aside = self._bodies.timelines.way_aside
+        continued = way_aside(body, now.step, at, aside, waits, rests, kept, until)
         return None if continued is None else plan_along(now, actor.plan, continued)
 
     def _stop(self, now: Situation, steps: int = 0) -> Plan:
@@ -659,7 +661,8 @@ class Yielding(Watcher):
         row = now.actor.row
         on = motion.breakpoints
         kept = self._politely[row]
-        return self._bodies.timelines.meeting_on(row, on, kept, now.step, self._far(now))[0] < 0
+        step, _ = self._bodies.timelines.meeting_on(row, on, kept, now.step, self._far(now))
+        return step < 0
 
     def _rests(self, row: int, step: int) -> bool:
         """Return whether a body stays where it is for a while, as far as is known."""
@@ -706,7 +709,7 @@ class Yielding(Watcher):
     def _keeps_its_place(self, now: Situation, at: int, other: int) -> bool:
         """Let a robot that wants to stop where this one stands yield; return whether it does."""
         row = now.actor.row
-        if other not in self._number or (min(row, other), max(row, other)) in self._swapped:
+        if other not in self._number or _pair(row, other) in self._swapped:
             return False
         if not self._is_taken(self._actors[other], row, now.step, at):
             return False
@@ -719,19 +722,24 @@ class Yielding(Watcher):
         if actor.state.away or (start is not None and is_point(start)):
             return
         others = [a for a in self._actors[: actor.row] if not a.state.away]
+        here = actor.state.position
         positions = np.array([a.state.position for a in others], np.int64).reshape(-1, 2)
         reach = self._near[self._number[actor.row]][[a.row for a in others]]
-        x, y = actor.state.position
-        if (((positions - [x, y]) ** 2).sum(axis=1) >= reach * reach).all():
+        squared = ((positions - here) ** 2).sum(axis=1)
+        if (squared >= reach * reach).all():
             return
         detour = giving_way.RoutesAround(actor, np.column_stack([positions, reach]))
-        beside = giving_way.beside(actor, (x, y), detour)
-        beside = beside or giving_way.beside(actor, (x, y), detour, in_room=False)
+        beside = giving_way.beside(actor, here, detour)
+        beside = beside or giving_way.beside(actor, here, detour, in_room=False)
         if beside is not None:
             actor.state = Pose(*beside, actor.state.heading, 0)
 
     def _steps(self, duration: timedelta) -> int:
         return max(-(-micros(duration) // self._step_us), 1)
+
+
+def _pair(row: int, other: int) -> tuple[int, int]:
+    return min(row, other), max(row, other)
 
 
 def _is_stuck(actor: DecidingActor) -> bool:

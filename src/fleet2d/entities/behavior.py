@@ -496,6 +496,11 @@ class Actor(Body):
         self._find_attention()
 
     @property
+    def is_recorded(self) -> bool:
+        """Whether what it does is recorded, so that it can't do anything else."""
+        return any(behavior.is_recorded for behavior in self.behaviors)
+
+    @property
     def is_off(self) -> bool:
         """Whether it is off: it neither moves, nor sees, nor hears."""
         return self.off_for is not None
