@@ -496,7 +496,7 @@ class Body:
         if not thing.uses:
             raise PlacementError(f"{self.path}: {thing.name} has no place to use it from")
         use = thing.uses[place % len(thing.uses)]
-        x, y = lattice.point_at((use.x, use.y))
+        x, y = lattice.point_at(use.at)
         heading = round(use.heading / (2 * np.pi) * TURN) % TURN
         approach = home.approach(use, self.space, self.part)
         at = PlaceAt(thing, x, y, heading, use.posture, approach)

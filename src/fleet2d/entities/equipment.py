@@ -116,9 +116,10 @@ class Charge:
         """Return the charge from the last decision on, if a motion is followed."""
         if self.is_off:  # at rest
             track = _track(motion)
-            ends = [(int(x), int(y)) for x, y in zip(track.x[-1:], track.y[-1:], strict=True)]
-            rate = self._gain if self.charger in ends and not self.is_broken else 0.0
-            return ChargeCurve(np.array([self._since_us]), np.array([self.level]), np.array([rate]))
+            ends = np.stack([track.x, track.y], axis=1)[-1:].tolist()
+            charges = list(self.charger) in ends and not self.is_broken
+            piece = [self._since_us], [self.level], [self._gain if charges else 0.0]
+            return ChargeCurve(*map(np.array, piece))
         return ChargeCurve(*kernels.charge_pieces(_track(motion), self._state))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
@@ -265,10 +266,9 @@ class Drift:
         self._every_us = micros(settings.corrected_every)
         hours = settings.corrected_every / timedelta(hours=1)
         self._jump_chance = settings.jumps_per_hour * hours
-        self._drift, self._jump, self._residual = (
-            _noise(metres * units_per_m)
-            for metres in (settings.drift, settings.jump, settings.left)
-        )
+        self._drift = _noise(settings.drift * units_per_m)
+        self._jump = _noise(settings.jump * units_per_m)
+        self._residual = _noise(settings.left * units_per_m)
         self._turn = _noise(settings.drift_deg / 360 * TURN)
         self._keys = {p: stream_key(seed, path, f"localization: {p}") for p in PURPOSES}
 
@@ -286,16 +286,18 @@ class Drift:
             draws = [kernels.random_bell(self._keys[purpose], interval) for interval in intervals]
             return (np.array(draws, np.int64) * noise)[which]
 
-        x, y = (
-            sample(f"left {axis}", self._residual)
-            + has_jumped * sample(f"jump {axis}", self._jump)
-            + _after(sample(f"drift {axis}", self._drift), elapsed_us)
-            for axis in "xy"
-        )
+        def along(axis: str) -> I64:
+            """Return the error along an axis at each step."""
+            left = sample(f"left {axis}", self._residual)
+            jump = sample(f"jump {axis}", self._jump)
+            drift = sample(f"drift {axis}", self._drift)
+            return left + has_jumped * jump + _after(drift, elapsed_us)
+
         turn = _after(sample("turn", self._turn), elapsed_us)
-        off = np.array([x, y, turn]) // FINE
+        off = np.array([along("x"), along("y"), turn]) // FINE
         for first, end, *moved in self._displacements:
-            off[:, (steps >= first) & (steps < end)] += np.array([moved]).T
+            is_displaced = (steps >= first) & (steps < end)
+            off[:, is_displaced] += np.array([moved]).T
         return Offsets(*off)
 
     def misplace(self, x: I64, y: I64, robot_x: I64, robot_y: I64, steps: I64) -> tuple[I64, I64]:

@@ -349,7 +349,7 @@ def _way(
         if route is None:
             return None
     plan = Plan(actor, time_us // actor.clock.step_us)
-    plan.time_us, plan.x, plan.y, plan.heading, plan.away = time_us, x, y, heading, 0
+    plan.end = time_us, x, y, heading, 0
     plan.legs = Legs()
     try:
         return plan.go_to_point(to_x, to_y, route=route).legs.rows()
@@ -452,10 +452,12 @@ def _continue(
             body is on time again after it.
     """
     later = plan.time_us - since_us
-    row = np.array([[since_us, plan.x, plan.y, plan.heading, plan.away]], np.int64)
+    row = np.array([[since_us, *plan.end[1:]]], np.int64)
     rows = np.concatenate([row, rest])
-    rests = (rows[1:, 1:] == rows[:-1, 1:]).all(axis=1) & (np.diff(rows[:, 0]) >= later)
-    edge = int(rows[np.argmax(rests) if hurries and rests.any() else -1, 0])
+    stands = (rows[1:, 1:] == rows[:-1, 1:]).all(axis=1)
+    is_long_rest = stands & (np.diff(rows[:, 0]) >= later)
+    last = np.argmax(is_long_rest) if hurries and is_long_rest.any() else -1
+    edge = int(rows[last, 0])
     times = rest[:, 0]
     rest[:, 0] = np.where(times <= edge, times + later, np.maximum(times, edge + later))
     plan.follow(rest)
@@ -477,7 +479,8 @@ def _take_over(plan: Plan, interrupted: Plan, delays: Sequence[tuple[int, int, i
 
 def _repeat_later(plan: Plan, interrupted: Plan, delays: Sequence[Delay]) -> None:
     """Add the notes and the postures of another plan, delayed."""
-    for delay, until in zip(delays, [*[d.after_us for d in delays[1:]], math.inf], strict=True):
+    ends = [*(delay.after_us for delay in delays[1:]), math.inf]
+    for delay, until in zip(delays, ends, strict=True):
         plan.notes += [
             Note(delay.of(at), event, detail)
             for at, event, detail in interrupted.notes

@@ -135,7 +135,7 @@ def matching_rooms(
     """
     for name in names:
         if name == ANY:
-            others = [r for r in reachable if r.name not in never_in and r.type not in never_in]
+            others = [room for room in reachable if not {room.name, room.type} & {*never_in}]
             return ANY, others or list(reachable)
         matches = [room for room in reachable if room.is_called(name)]
         if stands_in and name == LIVING_ROOM and not matches:
@@ -149,11 +149,14 @@ def matching_rooms(
         raise PlacementError(
             f"{requested} can't be reached from where it starts; it can reach: {room_names}"
         )
-    choices = [room.name for room in rooms] + sorted({room.type for room in rooms})
-    choices += [thing.name for thing in objects] + sorted({thing.type for thing in objects})
-    close = difflib.get_close_matches(names[0].split(OWNER_SEPARATOR)[0], choices, n=1)
+    choices = []
+    for things in (rooms, objects):
+        choices += [thing.name for thing in things]
+        choices += sorted({thing.type for thing in things})
+    unowned = [name.split(OWNER_SEPARATOR)[0] for name in names]
+    close = difflib.get_close_matches(unowned[0], choices, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
-    if any(name.split(OWNER_SEPARATOR)[0] in (t.name, t.type) for name in names for t in objects):
+    if any(thing.name in unowned or thing.type in unowned for thing in objects):
         raise PlacementError(f"no place from which {requested} is used can be reached")
     kinds = sorted({thing.type for thing in objects if thing.uses})
     furniture = f" The furniture is: {', '.join(kinds)}." if kinds else ""
@@ -231,10 +234,10 @@ def _gets_to(body: "Body", thing: PlacedObject) -> bool:
         return False
     x, y = body.place_at(thing, 0).approach
     use = thing.uses[0]
-    at = body.home.plan.lattice.point_at(use.approach or (use.x, use.y))
+    lattice = body.home.plan.lattice
+    at_x, at_y = lattice.point_at(use.approach or use.at)
     # Within a metre, if the place itself is too tight: not from another room behind a wall.
-    metre = body.home.plan.lattice.units_per_m
-    return bool((x - at[0]) ** 2 + (y - at[1]) ** 2 <= metre * metre)
+    return (x - at_x) ** 2 + (y - at_y) ** 2 <= lattice.units_per_m**2
 
 
 def available_places(
@@ -311,14 +314,14 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
         return False
     things: tuple[Room | PlacedObject, ...] = (*body.home.rooms, *body.home.objects)
     names = {thing.name for thing in things}
-    types = {thing.type for thing in things} | {k for room in body.home.rooms for k in room.labels}
-    return all(
-        name not in names
-        and not str(name)[-1:].isdigit()  # bathroom_8 is a single bathroom
-        and (name in types or name in FURNITURE or usual_type(str(name)) in PRIORITY)
-        for name in place
-        if name != ANY
-    )
+    types = {*FURNITURE, *(thing.type for thing in things)}
+    types = types.union(*(room.labels for room in body.home.rooms))
+    for name in place:
+        is_single = name in names or str(name)[-1:].isdigit()  # bathroom_8 is a single bathroom
+        is_type = name in types or usual_type(str(name)) in PRIORITY
+        if name != ANY and (is_single or not is_type):
+            return False
+    return True
 
 
 def points_at_distance(
@@ -347,9 +350,9 @@ class Nearest:
     """Centres [lattice] of the free cells that a body can get to, in one room or in all."""
 
     def __init__(self, body: "Body", room: int | None = None) -> None:
-        cells = body.space.cells(room, body.part)
+        rows, columns = body.space.cells(room, body.part).T
         xs, ys = body.home.plan.lattice.centre_axes()
-        self.centres: I64 = np.stack([xs[cells[:, 1]], ys[cells[:, 0]]], 1)
+        self.centres: I64 = np.stack([xs[columns], ys[rows]], 1)
 
     @cached_property
     def _tree(self) -> shapely.STRtree:

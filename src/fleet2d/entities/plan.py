@@ -34,6 +34,9 @@ class Note(NamedTuple):
 # Makes a note from a tuple of its fields without calling Python code, as plans have many.
 new_note: Callable[[tuple[int, str, str]], Note] = partial(tuple.__new__, Note)
 
+PlanEnd = tuple[int, int, int, int, int]
+"""Time [us], x, y [lattice], heading [1/4096 turn], and whether the body is away."""
+
 
 class Plan:
     """A timed path, built leg by leg: ``now.plan().go_to("kitchen").stay(timedelta(minutes=5))``.
@@ -86,6 +89,15 @@ class Plan:
     def step_us(self) -> int:
         """Length of a step [us]."""
         return self.body.clock.step_us
+
+    @property
+    def end(self) -> PlanEnd:
+        """Where it ends so far: the moment, and the pose there."""
+        return self.time_us, self.x, self.y, self.heading, self.away
+
+    @end.setter
+    def end(self, end: PlanEnd) -> None:
+        self.time_us, self.x, self.y, self.heading, self.away = end
 
     @property
     def position(self) -> LatticePoint:
@@ -163,11 +175,10 @@ class Plan:
         places = [self.position, *stops]
         if routes is None or is_driven or any(map(body.home.approach_of, places)):
             return False
-        now = self.time_us, self.x, self.y, self.heading
         way = routes, np.array(stops, np.int64), body.speed, body.turn_rate
-        end = self.legs.visit(*now, *way, round(turns * TURN), micros(dwell))
+        end = self.legs.visit(*self.end[:4], *way, round(turns * TURN), micros(dwell))
         if end is not None:
-            self.time_us, self.x, self.y, self.heading, _ = end
+            self.end = end
         return end is not None
 
     def _go_shortest(self, space: Space, x: int, y: int, off: LatticePoint | None) -> bool:
@@ -176,20 +187,19 @@ class Plan:
         routes = space.shortest
         if routes is None or body.drive is not None or body.slows:
             return False
-        now = self.time_us, self.x, self.y, self.heading
-        end = self.legs.go(*now, routes, x, y, body.speed, body.turn_rate, off)
+        end = self.legs.go(*self.end[:4], routes, x, y, body.speed, body.turn_rate, off)
         if end is not None:
-            self.time_us, self.x, self.y, self.heading, _ = end
+            self.end = end
         return end is not None
 
     def _walk(self, route: I64) -> None:
         body = self.body
         walk = self.time_us, self.heading, route, body.speed, body.turn_rate
         if body.drive is None and not body.slows:
-            self.time_us, self.x, self.y, self.heading, _ = self.legs.walk(*walk)
+            self.end = self.legs.walk(*walk)
             return
         legs = Legs()
-        legs.mark(self.time_us, self.x, self.y, self.heading, self.away)
+        legs.mark(*self.end)
         if body.drive is None:
             legs.walk(*walk)
         else:
@@ -216,11 +226,9 @@ class Plan:
             self.go_to_point(*at.approach)
         self._check_goes_on()
         body = self.body
-        now = (self.time_us, self.x, self.y, self.heading)
         if body.drive is None:
-            self.time_us, self.x, self.y, self.heading, _ = self.legs.settle(
-                *now, at.x, at.y, at.heading, body.speed, body.turn_rate
-            )
+            there = at.x, at.y, at.heading
+            self.end = self.legs.settle(*self.end[:4], *there, body.speed, body.turn_rate)
         else:
             self._step_to(at.x, at.y)
             self.turn_to(at.heading)
@@ -255,8 +263,8 @@ class Plan:
     def reaches(self, x: int, y: int) -> bool:
         """Return whether there is a way to a lattice point from where the plan ends so far."""
         space = self.body.space
-        at = self.position
-        return space.route(at, (x, y)) is not None or bool(space.passings(at, (x, y)))
+        way = self.position, (x, y)
+        return space.route(*way) is not None or bool(space.passings(*way))
 
     def follow(self, breakpoints: I64) -> Self:
         """Follow given breakpoints; between two of the same time, the body jumps.
@@ -277,10 +285,10 @@ class Plan:
                     f" {self.time_us} us on"
                 )
             self.legs.add(breakpoints)
-            self.time_us, self.x, self.y, self.heading, self.away = breakpoints[-1].tolist()
+            self.end = breakpoints[-1].tolist()
         return self
 
-    def go_on_along(self, legs: Legs, end: tuple[int, int, int, int, int]) -> Self:
+    def go_on_along(self, legs: Legs, end: PlanEnd) -> Self:
         """Follow breakpoints of the core instead of all so far: they begin where the plan does.
 
         Args:
@@ -288,13 +296,14 @@ class Plan:
             end: Time, x, y, heading and away at the last of them.
         """
         self.legs = legs
-        self.time_us, self.x, self.y, self.heading, self.away = end
+        self.end = end
         return self
 
     def jump(self, time_us: int, **changes: int) -> Self:
         """Change x, y, heading or away at once, at a moment [us since the start]."""
-        pose = {"x": self.x, "y": self.y, "heading": self.heading, "away": self.away}
-        rows = [[time_us, *pose.values()], [time_us, *(pose | changes).values()]]
+        before = {"x": self.x, "y": self.y, "heading": self.heading, "away": self.away}
+        after = before | changes
+        rows = [[time_us, *before.values()], [time_us, *after.values()]]
         return self.follow(np.array(rows, np.int64))
 
     def turn_by(self, turns: float) -> Self:
@@ -316,11 +325,7 @@ class Plan:
     def _turn(self, headings: int) -> Self:
         self._check_goes_on()
         if headings:
-            now = (self.time_us, self.x, self.y, self.heading)
-            rate = self.body.turn_rate
-            turned = self.legs.turn(*now, self.away, headings, rate)
-            self.time_us = turned[0]
-            self.heading = turned[3]
+            self.end = self.legs.turn(*self.end, headings, self.body.turn_rate)
         return self
 
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
@@ -436,10 +441,9 @@ class Plan:
         return self._over_at() if self._over is None else self._over[0]
 
     def _over_at(self) -> int | None:
-        end_us = None if self.endless else self.time_us
-        asks_us = self.asks_us
-        if asks_us is not None and (end_us is None or asks_us < end_us):
-            end_us = asks_us
+        end_us = self.asks_us
+        if not self.endless:
+            end_us = self.time_us if end_us is None else min(end_us, self.time_us)
         if end_us is None:
             return None
         # Else a behavior would be asked forever at one step for plans that take no time.
@@ -470,7 +474,7 @@ class Plan:
             )
 
     def _mark(self) -> None:
-        self.legs.mark(self.time_us, self.x, self.y, self.heading, self.away)
+        self.legs.mark(*self.end)
 
 
 def _check_posture(change: list[int]) -> list[int]:
@@ -541,7 +545,7 @@ def plan_of(body: Body, step: int, data: Mapping[str, Any]) -> Plan:
     plan.legs = Legs()
     with errors_as(ComponentError, f"{body.path}: the plan of an intervention", of=ValueError):
         plan.legs.add(rows)
-    plan.time_us, plan.x, plan.y, plan.heading, plan.away = data["rows"][-1]
+    plan.end = data["rows"][-1]
     plan.notes = [Note(*note) for note in data["notes"]]
     plan.interrupt_on(*data["interrupts"])
     plan.asks_us = data["asks_us"]
@@ -553,10 +557,12 @@ def plan_of(body: Body, step: int, data: Mapping[str, Any]) -> Plan:
 def _check_rows(body: Body, begin_us: int, rows: I64) -> None:
     """Refuse breakpoints that a body can't follow from a moment on."""
     size = body.home.plan.room_of_place.shape
-    x, y = rows[:, 1] // SUB, rows[:, 2] // SUB
+    x = rows[:, 1] // SUB
+    y = rows[:, 2] // SUB
     inside = (x >= 0) & (x < size[1]) & (y >= 0) & (y < size[0])
     times = rows[:, 0]
-    if not len(rows) or times[0] > begin_us or (np.diff(times) < 0).any() or not inside.all():
+    goes_back = bool((np.diff(times) < 0).any())
+    if not len(rows) or times[0] > begin_us or goes_back or not inside.all():
         raise ComponentError(
             f"{body.path}: the plan of an intervention can't be followed: its breakpoints should be"
             f" in the home and in order of time, the first at {begin_us} us or before"

@@ -70,13 +70,17 @@ class OccupancySensor(FurnitureSensor):
         """Return the steps in which the middle of a person is over the object."""
         lattice = home.plan.lattice
         footprint = home.object(self.of).footprint
-        x0, y0, x1, y1 = lattice.to_lattice(np.reshape(footprint.bounds, (2, 2))).ravel().tolist()
-        x, y = view.x[: view.users, 1:], view.y[: view.users, 1:]
-        on_object = view.present[: view.users, 1:] & (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
-        bodies, columns = np.nonzero(on_object)
-        if len(columns):
-            points = lattice.to_metres(np.stack([x[bodies, columns], y[bodies, columns]], axis=1))
-            on_object[bodies, columns] = shapely.intersects_xy(footprint, points)
+        low_x, low_y, high_x, high_y = footprint.bounds
+        x0, y0 = lattice.point_at((low_x, low_y))
+        x1, y1 = lattice.point_at((high_x, high_y))
+        people = slice(view.users)
+        x = view.x[people, 1:]
+        y = view.y[people, 1:]
+        is_near = (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
+        on_object = is_near & view.present[people, 1:]
+        if on_object.any():
+            points = np.column_stack([x[on_object], y[on_object]])
+            on_object[on_object] = shapely.intersects_xy(footprint, lattice.to_metres(points))
         return first_cause(on_object, view.first)
 
 
@@ -105,14 +109,17 @@ class SmartPlug(FurnitureSensor):
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps in which a person stays at one of the object's places."""
         lattice = home.plan.lattice
-        x, y = view.x[: view.users], view.y[: view.users]
+        people = slice(view.users)
+        x = view.x[people]
+        y = view.y[people]
         still = (np.diff(x) == 0) & (np.diff(y) == 0)
         at_device = np.zeros(still.shape, np.bool_)
         reach = round(self.reach * lattice.units_per_m)
         for use in home.object(self.of).uses:
-            at_x, at_y = lattice.point_at((use.x, use.y))
-            at_device |= (x[:, 1:] - at_x) ** 2 + (y[:, 1:] - at_y) ** 2 <= reach * reach
-        return first_cause(at_device & still & view.present[: view.users, 1:], view.first)
+            at_x, at_y = lattice.point_at(use.at)
+            squared = (x[:, 1:] - at_x) ** 2 + (y[:, 1:] - at_y) ** 2
+            at_device |= squared <= reach * reach
+        return first_cause(at_device & still & view.present[people, 1:], view.first)
 
 
 class MotionSensor(Sensor):
@@ -159,12 +166,14 @@ class MotionSensor(Sensor):
         present = view.present[rows]
         moved = (np.diff(x) != 0) | (np.diff(y) != 0)
         near = moved & present[:, 1:] & present[:, :-1]
-        dx, dy = x[:, 1:] - self.eye[0], y[:, 1:] - self.eye[1]
+        after_x = x[:, 1:]
+        after_y = y[:, 1:]
+        dx = after_x - self.eye[0]
+        dy = after_y - self.eye[1]
         near &= dx * dx + dy * dy <= self.reach * self.reach
-        bodies, columns = np.nonzero(near)
-        if len(columns):
-            points = np.stack([x[bodies, columns + 1], y[bodies, columns + 1]], axis=1)
-            near[bodies, columns] = self._in_view(points, home)
+        if near.any():
+            points = np.column_stack([after_x[near], after_y[near]])
+            near[near] = self._in_view(points, home)
         return first_cause(near, view.first)
 
     def _in_view(self, points: I64, home: Home) -> Bool:
@@ -182,7 +191,8 @@ class MotionSensor(Sensor):
             return np.ones(len(dx), np.bool_)
         middle = 2 * round(self.heading_deg / 360 * TURN)
         quarter = TURN // 2  # of a turn, in halves of a heading
-        right, left = middle - half, middle + half
+        right = middle - half
+        left = middle + half
         from_right = half_sine(right + quarter) * dy - half_sine(right) * dx >= 0
         to_left = half_sine(left) * dx - half_sine(left + quarter) * dy >= 0
         return from_right & to_left if half <= quarter else from_right | to_left
@@ -266,13 +276,14 @@ class ReplaySensor(Sensor, LogKeys):
         on = [_is_on(states[row], self.path, table.line[row]) for row in local.row.tolist()]
         self._steps = (local.time_us - begin_us) // clock.step_us
         self._on = np.array([bool(state) for state in on], bool)
-        ends = np.append(self._steps[1:], clock.steps).clip(0, clock.steps)
-        silent = np.array([state is None for state in on], bool)
-        silent_us = int((ends - self._steps.clip(0, clock.steps))[silent].sum()) * clock.step_us
-        gap = format_duration(timedelta(microseconds=silent_us))
-        self.notes = (*notes, f"off for {gap} of the run in which it is unavailable or unknown")
-        if not silent_us:
-            self.notes = notes
+        begins = self._steps.clip(0, clock.steps)
+        ends = np.append(begins[1:], clock.steps)
+        is_silent = np.array([state is None for state in on], bool)
+        silent_us = int((ends - begins)[is_silent].sum()) * clock.step_us
+        self.notes = notes
+        if silent_us:
+            gap = format_duration(timedelta(microseconds=silent_us))
+            self.notes += (f"off for {gap} of the run in which it is unavailable or unknown",)
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps at which it is on, caused by nobody known."""

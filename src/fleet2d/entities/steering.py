@@ -139,28 +139,37 @@ class Steering:
             velocity = self.first.velocity.towards(wanted, _gained(body, end_us))
             turn = round(velocity.turn_deg * seconds * TURN * FINE / 360)
             dx, dy = _turned(velocity, seconds * units, (heading + turn // 2) // FINE)
-            if is_free:
-                goal = _rounded(x + dx), _rounded(y + dy)
-                at, is_free = self._move(body, at, goal, units)
-            x, y = (x + dx, y + dy) if is_free else (FINE * at[0], FINE * at[1])
+            x += dx
+            y += dy
             heading += turn
+            if is_free:
+                goal = _rounded(x), _rounded(y)
+                at, is_free = self._move(body, at, goal, units)
+            at_x, at_y = at
+            if not is_free:
+                x = FINE * at_x
+                y = FINE * at_y
             faced = _rounded(heading)
-            rest = x - FINE * at[0], y - FINE * at[1], heading - FINE * faced
-            rows.append((plan.time_us + end_us, *at, faced % TURN, 0))
-            self._progress[plan.time_us + end_us] = Progress(velocity, rest)
+            rest = x - FINE * at_x, y - FINE * at_y, heading - FINE * faced
+            time_us = plan.time_us + end_us
+            rows.append((time_us, at_x, at_y, faced % TURN, 0))
+            self._progress[time_us] = Progress(velocity, rest)
         return np.array(rows, np.int64).reshape(-1, 5)
 
     def _move(
         self, body: Body, start: tuple[int, int], goal: tuple[int, int], units: float
     ) -> tuple[tuple[int, int], bool]:
         """Return how far the body gets, and whether nothing was in its way."""
-        dx, dy = goal[0] - start[0], goal[1] - start[1]
+        x, y = start
+        dx = goal[0] - x
+        dy = goal[1] - y
         pieces = max(1, math.ceil(_length(dx, dy) / (SPACING_M * units)))
         at = start
         for piece in range(1, pieces + 1):
-            to = start[0] + dx * piece // pieces, start[1] + dy * piece // pieces
-            is_outside = body.space.part_at(*to) < 0
-            if to != at and (is_outside or any(disc.blocks(at, to) for disc in self.others)):
+            to = x + dx * piece // pieces, y + dy * piece // pieces
+            if to == at:
+                continue
+            if body.space.part_at(*to) < 0 or any(disc.blocks(at, to) for disc in self.others):
                 return at, False
             at = to
         return at, True

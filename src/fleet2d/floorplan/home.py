@@ -214,7 +214,7 @@ class Home:
         Raises:
             PlacementError: The space has no such part.
         """
-        at = (use.x, use.y) if use.approach is None else use.approach
+        at = use.approach or use.at
         x, y = self.plan.lattice.point_at(at)
         if space.part_at(x, y) == part:
             return x, y
@@ -230,7 +230,7 @@ class Home:
         if self._places[0] != self.version:
             point_at = self.plan.lattice.point_at
             uses = (use for thing in self.objects for use in thing.uses)
-            ways = {point_at((u.x, u.y)): point_at(u.approach) for u in uses if u.approach}
+            ways = {point_at(use.at): point_at(use.approach) for use in uses if use.approach}
             self._places = self.version, ways
         return self._places[1]
 

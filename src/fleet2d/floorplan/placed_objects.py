@@ -140,6 +140,11 @@ class UsePlace:
     posture: Posture = "stand"
     approach: Point | None = None
 
+    @property
+    def at(self) -> Point:
+        """Where the middle of the body is [m]."""
+        return self.x, self.y
+
 
 @dataclass(frozen=True)
 class PlacedObject:

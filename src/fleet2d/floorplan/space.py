@@ -748,7 +748,7 @@ def nearest_standing(
         obstacles: Shapes over which no body steps [m].
     """
     lattice = plan.lattice
-    x, y = lattice.point_at((use.x, use.y))
+    x, y = lattice.point_at(use.at)
     if not strictly_inside(plan.mesh, x, y):
         return None
     units = int(reach * lattice.units_per_m) + HALF
@@ -757,7 +757,7 @@ def nearest_standing(
     for wanted in (FIRST_ATTEMPTS, ATTEMPTS):
         cells = nearest_cells_in_sight(plan.mesh, standing, x, y, units, ATTEMPTS, wanted)
         for row, column in cells[tried:].tolist():
-            ends = [(use.x, use.y), lattice.xy_of(*lattice.cell_centre(row, column))]
+            ends = [use.at, lattice.xy_of(*lattice.cell_centre(row, column))]
             step = shapely.linestrings(ends)  # quicker than the constructor
             if not shapely.intersects(step, obstacles).any():
                 return row, column

@@ -104,7 +104,8 @@ class Confusable(Settings):
         """The share of sightings in which it is taken for somebody else."""
         if self.rate is not None:
             return self.rate
-        return BY_HEIGHT.at(HEIGHTS[self.kind] if self.kind is not None else self.height or 0.0)
+        height = HEIGHTS[self.kind] if self.kind is not None else self.height
+        return BY_HEIGHT.at(height or 0.0)
 
 
 class TakenFor(PerceptionError):
@@ -146,11 +147,12 @@ class TakenFor(PerceptionError):
         self, sightings: CameraSightings, confusable: Confusable
     ) -> tuple[list[int], list[int]]:
         """Return the numbers of those that somebody is taken for, and cumulative weights."""
-        others = confusable.others or {u: 1.0 for u in sightings.users if u not in self.users}
-        others = others or {UNKNOWN: 1.0}
+        rest = [user for user in sightings.users if user not in self.users] or [UNKNOWN]
+        others = confusable.others or dict.fromkeys(rest, 1.0)
+        total = sum_in_order(others.values())
         names = [name for name, share in others.items() if share > 0]
         numbers = [self._number(sightings, name) for name in names]
-        weights = {name: others[name] / sum_in_order(others.values()) for name in names}
+        weights = {name: others[name] / total for name in names}
         return numbers, cumulative(weights, names)
 
     @staticmethod

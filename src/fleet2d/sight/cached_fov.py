@@ -32,6 +32,15 @@ class Regions(NamedTuple):
     right: I32
     wall: I32
 
+    def of_cell(self, row: int, column: int) -> Pieces | None:
+        """Return the region of a cell; None if it isn't free, or not in the grid."""
+        rows, columns = self.number.shape
+        if not (0 <= row < rows and 0 <= column < columns) or self.number[row, column] < 0:
+            return None
+        cell = self.number[row, column]
+        pieces = slice(self.start[cell], self.start[cell + 1])
+        return self.right[pieces], self.wall[pieces]
+
 
 class VisibilityPolygon(FieldOfView):
     """Compute the region visible from a place once, then look points up in it.
@@ -60,14 +69,12 @@ class VisibilityPolygon(FieldOfView):
     def _region(self, home: Home, x: int, y: int) -> Pieces:
         if getattr(self, "_walls", None) is not home.walls:
             self.start(home)
-        row, column = y // SUB, x // SUB
+        row = y // SUB
+        column = x // SUB
         if self._regions is not None and (x, y) == home.plan.lattice.cell_centre(row, column):
-            number, start, right, wall = self._regions
-            if 0 <= row < number.shape[0] and 0 <= column < number.shape[1]:
-                cell = number[row, column]
-                if cell >= 0:
-                    pieces = slice(start[cell], start[cell + 1])
-                    return right[pieces], wall[pieces]
+            pieces = self._regions.of_cell(row, column)
+            if pieces is not None:
+                return pieces
         region = self._visited.pop((x, y), None) or kernels.visible_region(home.walls, x, y)
         self._visited[x, y] = region
         if len(self._visited) > self.keep:
@@ -93,7 +100,8 @@ def _regions_of(home: Home) -> Regions:
 
 def _numbers(triangles: I32) -> I32:
     free = triangles >= 0
-    return np.where(free, np.cumsum(free.ravel()).reshape(free.shape) - 1, -1).astype(np.int32)
+    number = np.cumsum(free).reshape(free.shape) - 1
+    return np.where(free, number, -1).astype(np.int32)
 
 
 class CellBits(NamedTuple):
@@ -121,10 +129,12 @@ class Flashlight(FieldOfView):
     def sees(self, home: Home, x: int, y: int, heading: int, reach: Reach, points: I64) -> Bool:
         """Return which points lie in cells whose centre is in view."""
         cells = self._lookup(home, x, y, heading, reach)
-        row, column = points[:, 1] // SUB - cells.row, points[:, 0] // SUB - cells.column
+        row = points[:, 1] // SUB - cells.row
+        column = points[:, 0] // SUB - cells.column
         in_view = (row >= 0) & (row < cells.rows) & (column >= 0) & (column < cells.columns)
         bit = row[in_view] * cells.columns + column[in_view]
-        in_view[in_view] = cells.bits[bit >> 3] >> (7 - (bit & 7)).astype(np.uint8) & 1 == 1
+        byte = cells.bits[bit >> 3]
+        in_view[in_view] = byte >> (7 - (bit & 7)).astype(np.uint8) & 1 == 1
         return in_view
 
     def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
@@ -133,8 +143,9 @@ class Flashlight(FieldOfView):
         lattice = home.plan.lattice
         mask = np.zeros((lattice.rows, lattice.columns), np.bool_)
         box = np.unpackbits(cells.bits, count=cells.rows * cells.columns)
-        part = mask[cells.row : cells.row + cells.rows, cells.column : cells.column + cells.columns]
-        part[:] = box.reshape(cells.rows, cells.columns)
+        rows = slice(cells.row, cells.row + cells.rows)
+        columns = slice(cells.column, cells.column + cells.columns)
+        mask[rows, columns] = box.reshape(cells.rows, cells.columns)
         return mask
 
     def _lookup(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> CellBits:
@@ -160,7 +171,8 @@ class Flashlight(FieldOfView):
 
 def _pack(mask: Bool) -> CellBits:
     """Return the cells of a mask (rows, columns) as bits."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows = np.flatnonzero(mask.any(axis=1))
+    columns = np.flatnonzero(mask.any(axis=0))
     if len(rows) == 0:
         return CellBits(0, 0, 0, 0, np.zeros(0, np.uint8))
     box = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
@@ -173,5 +185,6 @@ def filled_cells(home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool
     lattice = home.plan.lattice
     grid = (lattice.rows, lattice.columns)
     mask = np.zeros(grid, np.bool_)
-    kernels.mark_spans(kernels.cells_in_view(home.walls, x, y, heading, reach, *grid), mask)
+    spans = kernels.cells_in_view(home.walls, x, y, heading, reach, *grid)
+    kernels.mark_spans(spans, mask)
     return mask

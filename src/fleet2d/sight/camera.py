@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from decimal import Decimal
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -66,14 +67,22 @@ class Lens(NamedTuple):
     latency: int
     points: int
 
+    @property
+    def is_moved(self) -> bool:
+        """Whether it isn't at the centre, or doesn't look along the body's heading."""
+        return bool(self.forward or self.left or self.heading or self.pans)
+
     def body(self, radius: float) -> list[tuple[int, int]]:
         """Return the points of a body of `radius` [lattice units] to look at: its centre first."""
-        steps = [round(i * TURN / self.points) for i in range(self.points)]
-        along = round(radius)
+        size = round(radius)
         half = UNIT // 2
-        ways = ((kernels.cosine(step), kernels.sine(step)) for step in steps)
-        circle = [(int(along * x + half) // UNIT, int(along * y + half) // UNIT) for x, y in ways]
-        return [(0, 0), *circle]
+        points = [(0, 0)]
+        for number in range(self.points):
+            heading = round(number * TURN / self.points)
+            x = size * kernels.cosine(heading) + half
+            y = size * kernels.sine(heading) + half
+            points.append((x // UNIT, y // UNIT))
+        return points
 
 
 class Camera(Settings):
@@ -206,7 +215,8 @@ def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], context: TableCon
     bodies = np.zeros((*shape, max(lens.points for lens in lenses) + 1, 2), np.int64)
     reach = np.zeros(shape, np.int64)
     widest = np.zeros(shape, np.int64)
-    pans = np.zeros((len(lenses), max(1, *(len(lens.pans) for lens in lenses), 0)), np.int64)
+    pan_count = _row(len(lens.pans) for lens in lenses)
+    pans = np.zeros((len(lenses), pan_count.max(initial=1)), np.int64)
     for c, lens in enumerate(lenses):
         pans[c, : len(lens.pans)] = lens.pans
         for u, radius in enumerate(context.radii):
@@ -214,17 +224,18 @@ def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], context: TableCon
             bodies[c, u, : len(body)] = body
             reach[c, u] = round(radius) + 1 if lens.points else 0
             widest[c, u] = (lens.far + reach[c, u]) ** 2
+    same = {name: _row(map(attrgetter(name), lenses)) for name in _SAME}
     return Lenses(
         near_squared=_row(lens.near**2 for lens in lenses),
         far_squared=_row(lens.far**2 for lens in lenses),
-        moves=_row(bool(lens.forward or lens.left or lens.heading or lens.pans) for lens in lenses),
+        moves=_row(lens.is_moved for lens in lenses),
         pans=pans,
-        pan_count=_row(len(lens.pans) for lens in lenses),
+        pan_count=pan_count,
         errs=_row(errs),
         bodies=bodies,
         reach=reach,
         widest=widest,
-        **{name: _row(getattr(lens, name) for lens in lenses) for name in _SAME},
+        **same,
     )
 
 
@@ -265,8 +276,9 @@ def error_tables(
     for c, (lens, errors) in enumerate(zip(lenses, perceptions, strict=True)):
         if errors is not None:
             reach = lens.far + max((round(radius) + 2 for radius in context.radii), default=0)
+            excess_bits = reach.bit_length() - (kernels.BINS - 1).bit_length()
             table = tables.table[c]
-            table[TablePart.SHIFT] = max(0, reach.bit_length() - (kernels.BINS - 1).bit_length())
+            table[TablePart.SHIFT] = max(0, excess_bits)
             _fill_detection(table, lens, errors.detection, context)
             _fill_identity(table, tables.confusion[c], errors.identity, context)
             _fill_attributes(table, errors.attributes, context)
@@ -293,11 +305,8 @@ def _fill_detection(table: I64, lens: Lens, model: Detection, context: TableCont
     _put(table, TablePart.BEARING, model.bearing.chances(angles))
     turns = [360 * i / TURN for i in range(kernels.HALF_TURN + 1)]
     _put(table, TablePart.FACING, model.orientation.chances(turns))
-    _put(
-        table,
-        TablePart.POSTURE,
-        [perception.chance(model.posture.get(name, 1.0)) for name in POSTURES],
-    )
+    factors = [model.posture.get(name, 1.0) for name in POSTURES]
+    _put(table, TablePart.POSTURE, list(map(perception.chance, factors)))
     count = lens.points + 1
     shares = [i / count for i in range(count + 1)]
     _put(table, TablePart.SHOWN, model.visible_share.chances(shares))
@@ -335,8 +344,9 @@ def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableCo
 
 def _whole_sums(shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
     """Return cumulative probabilities, 1 from the last possible outcome on, despite rounding."""
-    last = max((i for i, name in enumerate(order) if shares.get(name)), default=len(order))
-    return [*perception.cumulative(shares, order)[:last], *[ONE] * (len(order) - last)]
+    possible = [number for number, name in enumerate(order) if shares.get(name)]
+    last = max(possible, default=len(order))
+    return perception.cumulative(shares, order)[:last] + [ONE] * (len(order) - last)
 
 
 def _check_users(names: Mapping[str, object], key: str, context: TableContext) -> None:
@@ -380,7 +390,8 @@ def _fill_false_positives(
         total += term
         tables.ghosts[camera, count] = perception.chance(min(total, 1.0))
         term *= float(mean) / (count + 1)
-    shares = {str(i): rate / sum_in_order(rates) for i, rate in enumerate(rates)}
+    total_rate = sum_in_order(rates)
+    shares = {str(i): rate / total_rate for i, rate in enumerate(rates)}
     tables.source[camera, : len(rates)] = _whole_sums(shares, list(shares))
     for i, spot in enumerate(model.spots, 1):
         x, y = context.lattice.point_at(spot.at)

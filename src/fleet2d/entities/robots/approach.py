@@ -146,9 +146,11 @@ def _cover(actor: Actor, room: Room, goals: I64, enough: float, most: int) -> Vi
         best = int(np.argmax(gains))
         if not gains[best]:
             break
-        points.append((int(places[best, 0]), int(places[best, 1])))
+        x, y = places[best].tolist()
+        points.append((x, y))
         unseen &= ~visible[best]
-    return Viewpoints(tuple(points), 1 - float(unseen.sum()) / len(goals))
+    share = 1 - float(unseen.sum()) / len(goals)
+    return Viewpoints(tuple(points), share)
 
 
 # The part of a room without furniture to be seen, and the maximum number of stops in a room.
@@ -163,17 +165,15 @@ def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
         The names of the furniture, of each point; and the points [lattice], int64 (n, 2). In a
         room without furniture that is used there are no names, and points all over the floor.
     """
-    home = actor.home
-    plan = home.plan
-    uses = [
-        (thing.name, (use.x, use.y))
-        for thing in home.objects
-        for use in thing.uses
-        if thing.type != "charger" and plan.room_at(use.x, use.y) == plan.rooms[room.index]
-    ]
-    if uses:
-        return [name for name, _ in uses], plan.lattice.to_lattice([at for _, at in uses])
-    return [], floor_of(actor, room)
+    plan = actor.home.plan
+    names = []
+    places = []
+    for thing in actor.home.objects:
+        for use in thing.uses:
+            if thing.type != "charger" and plan.room_at(*use.at) == plan.rooms[room.index]:
+                names.append(thing.name)
+                places.append(use.at)
+    return names, plan.lattice.to_lattice(places) if names else floor_of(actor, room)
 
 
 def stops_with_view(actor: Actor, room: Room) -> tuple[LatticePoint, ...]:
@@ -183,10 +183,10 @@ def stops_with_view(actor: Actor, room: Room) -> tuple[LatticePoint, ...]:
     """
     names, goals = places_to_see(actor, room)
     enough = 1.0 if names else FLOOR_TO_SEE
-    key = "stops", actor.home.walls, actor.home.objects, actor.space, actor.part, sight_range(actor)
-    views = actor.home.cached(
-        (*key, room.index), lambda: _cover(actor, room, goals, enough, MOST_STOPS)
-    )
+    home = actor.home
+    body = actor.space, actor.part, sight_range(actor)
+    key = "stops", home.walls, home.objects, *body, room.index
+    views = home.cached(key, lambda: _cover(actor, room, goals, enough, MOST_STOPS))
     return views.points or (actor.middle(room),)
 
 
@@ -197,15 +197,16 @@ def unwatched(actor: Actor, stops: Sequence[LatticePoint]) -> list[str]:
     the share of the floor, if it is more than half.
     """
     lines = []
+    places = np.array(stops, np.int64).reshape(-1, 2)
     for room in actor.home.rooms:
         names, goals = places_to_see(actor, room)
-        places = np.array(stops, np.int64).reshape(-1, 2)
-        seen = visible_from(actor, places, goals).any(axis=0)
-        if names and not seen.all():
-            hidden = list(dict.fromkeys(names[i] for i in np.flatnonzero(~seen)))
-            lines.append(f"{room.name} ({np.mean(~seen):.0%} of its places: {', '.join(hidden)})")
-        elif not names and np.mean(seen) < 1 / 2:
-            lines.append(f"{room.name} ({np.mean(~seen):.0%} of its floor)")
+        is_hidden = ~visible_from(actor, places, goals).any(axis=0)
+        share = np.mean(is_hidden)
+        if names and share > 0:
+            things = dict.fromkeys(names[i] for i in np.flatnonzero(is_hidden))
+            lines.append(f"{room.name} ({share:.0%} of its places: {', '.join(things)})")
+        elif not names and share > 1 / 2:
+            lines.append(f"{room.name} ({share:.0%} of its floor)")
     return lines
 
 
@@ -239,20 +240,24 @@ def spread(cells: I64, most: int) -> I64:
     pitch = 1
     is_cell = np.zeros((rows[-1] + 1, columns.max() + 1), np.bool_)
     is_cell[rows, columns] = True
-    while np.count_nonzero(is_cell[pitch // 2 :: pitch, pitch // 2 :: pitch]) > most:
+    grid = is_cell
+    while np.count_nonzero(grid) > most:
         pitch += 1
-    on_grid = cells_of(is_cell[pitch // 2 :: pitch, pitch // 2 :: pitch]) * pitch + pitch // 2
+        grid = is_cell[pitch // 2 :: pitch, pitch // 2 :: pitch]
+    on_grid = cells_of(grid) * pitch + pitch // 2
     return on_grid if len(on_grid) else cells[:: max(1, len(cells) // most)]
 
 
 def stands_in(actor: Actor, room: Room) -> I64:
     """Return points of a room [lattice] where a body can stand, evenly spread, int64 (n, 2)."""
-    return centres(spread(actor.space.cells(room.index, actor.part), MAX_VIEWPOINT_CELLS))
+    cells = actor.space.cells(room.index, actor.part)
+    return centres(spread(cells, MAX_VIEWPOINT_CELLS))
 
 
 def floor_of(actor: Actor, room: Room) -> I64:
     """Return points of the floor of a room [lattice], evenly spread, int64 (n, 2)."""
-    return centres(spread(cells_of(actor.home.plan.room_of_cell == room.index), MAX_TARGET_CELLS))
+    cells = cells_of(actor.home.plan.room_of_cell == room.index)
+    return centres(spread(cells, MAX_TARGET_CELLS))
 
 
 def centres(cells: I64) -> I64:
@@ -270,8 +275,10 @@ def way_seconds(actor: Actor, start: LatticePoint, goal: LatticePoint) -> float 
     The usual drive, `differential`, leaves out its turns; others begin in the direction of the way.
     """
     route = actor.space.route(start, goal)
-    if route is None or actor.drive is None:
-        return None if route is None else sum_in_order(_legs(route)) / actor.speed
+    if route is None:
+        return None
+    if actor.drive is None:
+        return sum_in_order(_legs(route)) / actor.speed
     (dx, dy), *_ = np.diff(route, axis=0).tolist() or [[0, 0]]
     rows = actor.breakpoints(route, 0, heading_of(dx, dy))
     return float(rows[-1, 0]) / 1e6 if len(rows) else 0.0
@@ -293,9 +300,9 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     actor = now.actor
     lattice = now.home.plan.lattice
     position = actor.state.position
-    person = lattice.to_lattice((x, y))
+    person = lattice.point_at((x, y))
     goal = lattice.point_at(now.nearest_free(x, y))
-    route = actor.space.route(position, (goal[0], goal[1]))
+    route = actor.space.route(position, goal)
     reach = distance * lattice.units_per_m
     if route is None or _distance(person, position) <= reach:
         return position
@@ -309,7 +316,7 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         for x_at, y_at in points[is_near].tolist():
             if actor.space.part_at(x_at, y_at) == actor.part:
                 return x_at, y_at
-    return int(goal[0]), int(goal[1])
+    return goal
 
 
 def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoint:

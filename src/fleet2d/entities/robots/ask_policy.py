@@ -16,7 +16,7 @@ from fleet2d.configuration.units import PositiveDuration
 from fleet2d.entities.behavior import Actor, Situation
 from fleet2d.entities.giving_way import resumed
 from fleet2d.entities.plan import Plan
-from fleet2d.entities.robots.interact import Interact, ServedRequest
+from fleet2d.entities.robots.interact import Interact, ServedRequest, answers_to
 from fleet2d.entities.robots.policy import (
     HOURS,
     KIND_OF_TYPE,
@@ -27,7 +27,7 @@ from fleet2d.entities.robots.policy import (
     LearnedBehavior,
 )
 from fleet2d.errors import PlacementError
-from fleet2d.interactions.interaction import OUTCOMES, InteractionKind, Outcome, Request
+from fleet2d.interactions.interaction import InteractionKind, Outcome, Request
 from fleet2d.kernels import F32, F64, TURN, UNIT, Bool
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_S, HOUR_S
 from fleet2d.runtime.events import EventKind
@@ -206,7 +206,8 @@ class AskPolicy(LearnedBehavior, Interact):
     def _answers(self, now: Situation, row: int, person: str) -> dict[str, float]:
         """Return the columns of how a person has answered, to an interaction and to all."""
         assert now.requests is not None
-        same = [k for k, each in enumerate(now.requests.interactions.values()) if each.to == person]
+        wanted = now.requests.interactions.values()
+        same = [number for number, each in enumerate(wanted) if each.to == person]
         hours = [(now.time.hour + near) % HOURS for near in (-1, 0, 1)]
         elapsed_s = now.step * now.actor.clock.step_us / 1e6
         since_s = elapsed_s - float(self.asked_at[same].max(initial=-np.inf))
@@ -310,7 +311,7 @@ class AskPolicy(LearnedBehavior, Interact):
     def _remember_answer(self, now: Situation, served: ServedRequest) -> None:
         """Count the answer to a question; none, if it was sent away, too."""
         row = self.names(now).index(served.request.name)
-        answers = [e.event for e in now.events if e.event in OUTCOMES and e.user == served.text]
+        answers = answers_to(now, served.text)
         hour = now.time.hour
         self.asked[row, hour] += 1
         self.accepted[row, hour] += Outcome.ACCEPTED in answers

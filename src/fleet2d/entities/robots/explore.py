@@ -56,7 +56,8 @@ class Explore(Behavior):
         self.floor: Bool = np.isin(plan.room_of_cell, rooms) & plan.free
         cells = actor.space.cells(None, actor.part)
         if avoided:
-            cells = cells[self.floor[cells[:, 0], cells[:, 1]]]
+            row, column = cells.T
+            cells = cells[self.floor[row, column]]
         self.stands = spread(cells, MAX_VIEWPOINT_CELLS)
         self.targets = spread(np.argwhere(self.floor), MAX_TARGET_CELLS)
         self.tried: Bool = np.zeros(len(self.targets), np.bool_)  # looked at, seen or not
@@ -84,17 +85,17 @@ class Explore(Behavior):
             self.has_looked = True
             return plan.turn_by(1.0)
         explored: Bool = now.home.layers[f"explored.{now.actor.name}"].values
-        share = float((explored & self.floor).sum()) / max(1.0, float(self.floor.sum()))
+        seen = float((explored & self.floor).sum())
+        share = seen / max(1.0, float(self.floor.sum()))
         self.is_shut_out = False
         self.stand = None if share >= self.enough else self._next(now, explored)
         if self.is_shut_out:
             return None
+        percent = f"{100 * share:.1f} %"
         if self.stand is None:
             self.is_done = True
-            return plan.note(EventKind.EXPLORED, f"{100 * share:.1f} %").stay(
-                timedelta(microseconds=1)
-            )
-        plan.note(EventKind.EXPLORES, f"{100 * share:.1f} %")
+            return plan.note(EventKind.EXPLORED, percent).stay(timedelta(microseconds=1))
+        plan.note(EventKind.EXPLORES, percent)
         row, column = self.stands[self.stand].tolist()
         plan.go_to_point(*now.home.plan.lattice.cell_centre(row, column))
         self.plan = plan.turn_by(1.0)
@@ -105,19 +106,20 @@ class Explore(Behavior):
         last = now.actor.plan
         if self.stand is not None and last.root is self.plan and last.is_over(now.step):
             self.tried |= self._visible(now.actor, self.stand)
-        unseen = ~explored[self.targets[:, 0], self.targets[:, 1]] & ~self.tried
+        row, column = self.targets.T
+        unseen = ~(explored[row, column] | self.tried)
         near = np.flatnonzero(self._near_frontier(now, explored))
-        gains = [np.count_nonzero(self._visible(now.actor, i) & unseen) for i in near.tolist()]
-        shows_enough = np.array(gains, np.int64) > WORTH * len(self.targets)
+        actor = now.actor
+        newly_seen = [self._visible(actor, stand) & unseen for stand in near.tolist()]
+        gains = np.array(list(map(np.count_nonzero, newly_seen)), np.int64)
+        shows_enough = gains > WORTH * len(self.targets)
         near = near[shows_enough]
-        gain = np.array(gains, np.float64)[shows_enough]
         if not len(near):
             return None
-        actor = now.actor
         position = actor.state.position
         metres = actor.space.distances(position, centres(self.stands[near]))
         seconds = actor.seconds(metres) + TURN / actor.turn_rate
-        best = int(np.argmax(gain / seconds))
+        best = int(np.argmax(gains[shows_enough] / seconds))
         self.is_shut_out = not bool(np.isfinite(seconds[best]))
         return None if self.is_shut_out else int(near[best])
 
@@ -127,7 +129,8 @@ class Explore(Behavior):
         frontier = self.floor & ~explored & is_beside
         away = squared_distance(~frontier)
         cells = self.reach / now.home.plan.lattice.cell
-        near: Bool = away[self.stands[:, 0], self.stands[:, 1]] <= cells * cells
+        row, column = self.stands.T
+        near: Bool = away[row, column] <= cells * cells
         near[sorted(self.blocked_stands)] = False
         return near if frontier.any() else np.zeros(len(self.stands), np.bool_)
 

@@ -1,5 +1,6 @@
 """Hangout: stand near people without blocking their way, and move rarely."""
 
+from collections import defaultdict
 from datetime import timedelta
 from functools import partial
 from itertools import combinations
@@ -10,7 +11,7 @@ from pydantic import Field
 
 from fleet2d.configuration.units import PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Hours, Situation, holds
-from fleet2d.entities.place import avoided_rooms
+from fleet2d.entities.place import Point, avoided_rooms
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.approach import BeliefBehavior, centres, sight_range, viewpoints_of
 from fleet2d.errors import PlacementError
@@ -99,12 +100,11 @@ class HangoutPlaces:
         plan = actor.home.plan
         cells = actor.space.cells(None, actor.part)
         pitch = max(1, round(PITCH / plan.lattice.cell))
-        on_grid = (cells[:, 0] % pitch == 0) & (cells[:, 1] % pitch == 0)
+        on_grid = (cells % pitch == 0).all(axis=1)
         rooms = plan.room_of_cell[cells[:, 0], cells[:, 1]].astype(np.int64)
         is_candidate = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
-        cells = cells[is_candidate]
         rooms = rooms[is_candidate]
-        points = centres(cells)
+        points = centres(cells[is_candidate])
         for door in plan.doorways:
             line = plan.lattice.to_lattice((door.start, door.end))
             clear = ~points_near(points, line, OFF_DOORS_M * plan.lattice.units_per_m)
@@ -118,16 +118,15 @@ class HangoutPlaces:
         Each place at furniture is looked up once, not for every room.
         """
         home = self._actor.home
-        uses: dict[int, list[tuple[float, float]]] = {}
-        for use in (use for thing in home.objects for use in thing.uses):
-            room = home.plan.room_at(use.x, use.y)
-            if room is not None:
-                uses.setdefault(room.index, []).append((use.x, use.y))
-        return tuple(
-            read_only(self._seats_of(room, uses.get(room.index, []))) for room in home.rooms
-        )
+        uses: defaultdict[int, list[Point]] = defaultdict(list)
+        for thing in home.objects:
+            for use in thing.uses:
+                room = home.plan.room_at(*use.at)
+                if room is not None:
+                    uses[room.index].append(use.at)
+        return tuple(read_only(self._seats_of(room, uses[room.index])) for room in home.rooms)
 
-    def _seats_of(self, room: Room, uses: list[tuple[float, float]]) -> I64:
+    def _seats_of(self, room: Room, uses: list[Point]) -> I64:
         plan = self._actor.home.plan
         if uses:
             return np.ascontiguousarray(plan.lattice.to_lattice(uses))
@@ -160,12 +159,11 @@ class HangoutPlaces:
         home = actor.home
         space = home.space(PERSON, opens_doors=True)
         anchors = home.plan.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
-        stops = [space.nearest(x, y, 0, r) for r, (x, y) in enumerate(anchors)]
-        pairs = list(combinations([stop for stop in stops if stop is not None], 2))
+        stops = [space.nearest(x, y, 0, room) for room, (x, y) in enumerate(anchors)]
         reach = (PERSON + actor.entity.radius) * home.plan.lattice.units_per_m
         blocked = np.zeros(len(self.points))
         ways = 0
-        for start, goal in pairs:
+        for start, goal in combinations(filter(None, stops), 2):
             route = space.route(start, goal)
             if route is not None and len(route) > 1:
                 ways += 1
@@ -175,7 +173,7 @@ class HangoutPlaces:
     def _proximity(self) -> F64:
         """Return how deep each place is in the personal space of the nearest seat, 0 to 1."""
         plan = self._actor.home.plan
-        uses = [(use.x, use.y) for thing in self._actor.home.objects for use in thing.uses]
+        uses = [use.at for thing in self._actor.home.objects for use in thing.uses]
         if not uses or not len(self.points):
             return np.zeros(len(self.points))
         seats = plan.lattice.to_lattice(uses)
@@ -282,9 +280,10 @@ class Hangout(BeliefBehavior):
         if quiet_until is not None and not is_in_avoided_room:
             return plan.stay(until=quiet_until)
         if self.place is not None and now.actor.kept_out:
-            x, y = self.places.points[self.place].tolist()
-            self.place = self.place if plan.reaches(x, y) else None
-        if self.place is None or (quiet_until is None and now.time >= self.decides_at):
+            point = self.places.points[self.place].tolist()
+            self.place = self.place if plan.reaches(*point) else None
+        is_due = quiet_until is None and now.time >= self.decides_at
+        if self.place is None or is_due:
             self.is_blocked = False
             self.decides_at = now.time + self.period
             draws = now.random("hangout")
@@ -300,7 +299,8 @@ class Hangout(BeliefBehavior):
         if quiet_until is not None:
             return plan.stay(until=quiet_until)
         quiet_begins = (span.next_begin(now.time) for span in self.quiet)
-        return plan.stay(until=self.decides_at).ask_by(min([self.decides_at, *quiet_begins]))
+        asks_by = min([self.decides_at, *quiet_begins])
+        return plan.stay(until=self.decides_at).ask_by(asks_by)
 
     def give_up(self, now: Situation) -> None:
         """Stay where it is until the next period."""
@@ -312,22 +312,24 @@ class Hangout(BeliefBehavior):
         if output is None or output is not self.rated_output:  # an output never changes
             self._rate(self.belief(now, self.user).joint)
             self.rated_output = output
-        worth = self.worth
-        if self._stays(plan, worth):
+        if self._stays(plan):
             return
-        scores = worth - self._ways(now.actor)
+        scores = self.worth - self._ways(now.actor)
         best = int(np.argmax(scores))
         if self.place is not None and scores[best] <= scores[self.place] + self.hysteresis:
             return
         self.place = best
-        plan.note(EventKind.RELOCATES, now.home.plan.rooms[int(self.places.room[best])].name)
+        room = int(self.places.room[best])
+        plan.note(EventKind.RELOCATES, now.home.plan.rooms[room].name)
 
-    def _stays(self, plan: Plan, worth: F64) -> bool:
+    def _stays(self, plan: Plan) -> bool:
         """Return whether no place is better, however short the way there, and long its own.
 
         It spares robots that yield the ways to all places, as they stand elsewhere each time.
         """
-        if self.place is None or self.best > worth[self.place] - self.moving + self.hysteresis:
+        if self.place is None:
+            return False
+        if self.best > self.worth[self.place] - self.moving + self.hysteresis:
             return False
         return plan.reaches(*self.places.points[self.place].tolist())
 

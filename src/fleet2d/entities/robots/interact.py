@@ -178,7 +178,8 @@ class Interact(BeliefBehavior):
 
     def reads(self) -> tuple[str, ...]:
         """Return the algorithms that it reads."""
-        return (*super().reads(), *(() if self.timing is None else (self.timing,)))
+        own = () if self.timing is None else (self.timing,)
+        return super().reads() + own
 
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
@@ -206,7 +207,8 @@ class Interact(BeliefBehavior):
         for request in queue.open:
             times += [self.left_alone.get(request.to), self.not_sought.get(request.to)]
             times.append(self.set_aside.get(request.text))
-        return min((time for time in times if time is not None and time > now.time), default=None)
+        later = (time for time in times if time is not None and time > now.time)
+        return min(later, default=None)
 
     def busy(self) -> bool:
         """Return whether it is with a person, which hours don't end."""
@@ -227,11 +229,11 @@ class Interact(BeliefBehavior):
         ready = self._ready(now)
         if plan is not None or not ready:
             return plan
-        return (
-            self._address(now, ready, served)
-            or self._look_on(now, ready, served)
-            or self._look_for_somebody(now, [r for r in ready if r.to not in now.in_view])
-        )
+        plan = self._address(now, ready, served) or self._look_on(now, ready, served)
+        if plan is None:
+            out_of_view = [request for request in ready if request.to not in now.in_view]
+            plan = self._look_for_somebody(now, out_of_view)
+        return plan
 
     def _take_served(self, now: Situation) -> ServedRequest | None:
         """Return and forget what it is doing; None if another behavior has interrupted that."""
@@ -295,7 +297,8 @@ class Interact(BeliefBehavior):
         """Wait after a round without a person to address: not found, or in view and left alone."""
         pause = UNANSWERED_PAUSE if person in self.unanswered else SEARCH_PAUSE
         if not is_in_view:
-            usual = min(MOST_SURE, sum_in_order(self.belief(now, person).joint.tolist()))
+            joint = self.belief(now, person).joint
+            usual = min(MOST_SURE, sum_in_order(joint.tolist()))
             doubted = self.at_home.note_empty(person, now.time, usual, SOUGHT_FROM)
             pause = max(SEARCH_PAUSE, doubted)
         self.not_sought[person] = now.time + pause
@@ -373,11 +376,10 @@ class Interact(BeliefBehavior):
         """Carry out what was accepted, or withdraw after another answer."""
         request = served.request
         to = served.text.rpartition(" ")[2]
-        answers = [e.event for e in now.events if e.event in OUTCOMES and e.user == served.text]
+        answers = answers_to(now, served.text)
         if Outcome.ACCEPTED in answers:
             self.served = served._replace(step="carry_out")
-            done = EventKind.DELIVERED if to == request.interaction.to else EventKind.COLLECTS
-            self.plan = now.plan().stay(request.interaction.takes).note(done, served.text)
+            self.plan = _carry_out(now, request, served.text)
             return self.plan.stay(timedelta(seconds=1))
         if not answers:
             assert now.requests is not None
@@ -391,16 +393,17 @@ class Interact(BeliefBehavior):
 
     def _seek(self, now: Situation, request: Request, joint: F64) -> Plan:
         """Look into the likeliest rooms, on one round; the person may come into view on the way."""
+        chances = joint.tolist()
         rooms = now.actor.reachable_rooms()
-        rooms.sort(key=lambda room: (-float(joint[room.index]), room.index))
-        total = sum_in_order(float(joint[room.index]) for room in rooms)
+        rooms.sort(key=lambda room: (-chances[room.index], room.index))
+        total = sum_in_order(chances[room.index] for room in rooms)
         self.served = ServedRequest(request, "seek", request.text)
         self.plan = now.plan()
         looked = 0.0
         for room in rooms:
             if looked > ENOUGH * total:
                 break
-            looked += float(joint[room.index])
+            looked += chances[room.index]
             self.plan.go_to_point(*now.actor.middle(room)).turn_by(1)
         return self.plan.interrupt_on(EventKind.USER_SEEN)
 
@@ -420,6 +423,20 @@ class Interact(BeliefBehavior):
             return None
         self.served = served
         return plan.interrupt_on(EventKind.USER_SEEN)
+
+
+def answers_to(now: Situation, text: str) -> list[str]:
+    """Return the answers to a question of which a robot has heard at a step."""
+    events = (event for event in now.events if event.user == text)
+    return [event.event for event in events if event.event in OUTCOMES]
+
+
+def _carry_out(now: Situation, request: Request, text: str) -> Plan:
+    """Return a plan to do what somebody accepted: deliver it to whom it is for, or collect it."""
+    interaction = request.interaction
+    is_delivered = text.rpartition(" ")[2] == interaction.to
+    done = EventKind.DELIVERED if is_delivered else EventKind.COLLECTS
+    return now.plan().stay(interaction.takes).note(done, text)
 
 
 class Opportunistic(Behavior):
@@ -474,9 +491,7 @@ class Opportunistic(Behavior):
         if asked is not None and asked[1] in texts:
             request, text = asked
             person = text.rpartition(" ")[2]
-            done = EventKind.DELIVERED if person == request.interaction.to else EventKind.COLLECTS
-            plan = now.plan().stay(request.interaction.takes).note(done, text)
-            return plan.note(EventKind.INTERACTION_OVER, person)
+            return _carry_out(now, request, text).note(EventKind.INTERACTION_OVER, person)
         avoided = self.avoided | now.actor.banned(now.step)
         for name, (x, y) in sorted(now.in_view.items()):
             is_meant = not self.users or name in self.users

@@ -1,7 +1,9 @@
 """Rounds of a robot: through rooms, along waypoints or a recorded path; visits at set times."""
 
+import math
 from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -78,7 +80,8 @@ class Patrol(Behavior):
         if self.waypoints:
             stops = [actor.point(point) for point in self.waypoints]
         elif self.rooms == "all":
-            stops = [s for room in actor.reachable_rooms() for s in self._stops_in(actor, room)]
+            rooms = actor.reachable_rooms()
+            stops = [stop for room in rooms for stop in self._stops_in(actor, room)]
         else:
             places = available_places(actor, "patrol.rooms", self.rooms)
             stops = [stop for place in places for stop in self._stops_at(actor, place)]
@@ -171,26 +174,30 @@ class Scheduled(Behavior):
         """Find the stops."""
         self.stops = [stop_at(actor, visit.place) for visit in self.visits]
         avoided = avoided_rooms(actor, "scheduled.no_stops_in", self.no_stops_in)
-        self.left_out = {i for i, xy in enumerate(self.stops) if lies_in(actor, xy, avoided)}
+        stops = enumerate(self.stops)
+        self.left_out = {number for number, stop in stops if lies_in(actor, stop, avoided)}
         if self.left_out:
-            rooms = ", ".join(sorted({self._room_name(actor, i) for i in self.left_out}))
+            names = sorted({self._room_name(actor, number) for number in self.left_out})
             actor.notes.append(
-                f"scheduled.visits: left out, because of `no_stops_in`: those of {rooms}"
+                f"scheduled.visits: left out, because of `no_stops_in`: those of {', '.join(names)}"
             )
         self.last_decision = actor.clock.start - timedelta(microseconds=1)
         self.pending: list[tuple[datetime, int]] = []  # due time and number of visits to make
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
         """Return when the next visit is due, or a shut door is tried again."""
-        due = next((due for due, _ in self._due(max(self.last_decision, now.time))), None)
-        retry = now.time + DOOR_WAIT if self.pending else None
-        return min((time for time in (due, retry) if time is not None), default=None)
+        visits = self._due(max(self.last_decision, now.time))
+        times = [due for due, _ in islice(visits, 1)]
+        if self.pending:
+            times.append(now.time + DOOR_WAIT)
+        return min(times, default=None)
 
     def decide(self, now: Situation) -> Plan | None:
         """Make a visit that is due, or leave the decision to later behaviors."""
         fresh = [visit for visit in self._due(self.last_decision) if visit[0] <= now.time]
         self.last_decision = now.time
-        self.pending = [v for v in self.pending + fresh if now.time - v[0] <= self.late]
+        visits = self.pending + fresh
+        self.pending = [visit for visit in visits if now.time - visit[0] <= self.late]
         for due, number in self.pending:
             if not now.actor.may_block_routes or now.plan().reaches(*self.stops[number]):
                 self.pending.remove((due, number))
@@ -224,7 +231,9 @@ class Scheduled(Behavior):
                 for number, visit in enumerate(self.visits)
                 if number not in self.left_out and day.weekday() in weekdays_of(visit.on)
             ]
-            yield from (entry for entry in sorted(today) if entry[0] > since)
+            for entry in sorted(today):
+                if entry[0] > since:
+                    yield entry
 
 
 class Retrace(Behavior):
@@ -297,6 +306,7 @@ def _thin_out(points: I64, spacing: float) -> list[LatticePoint]:
     """Return points in order, each farther than `spacing` from the one before [lattice]."""
     path: list[LatticePoint] = []
     for x, y in points.tolist():
-        if not path or (x - path[-1][0]) ** 2 + (y - path[-1][1]) ** 2 > spacing * spacing:
+        last_x, last_y = path[-1] if path else (math.inf, math.inf)
+        if (x - last_x) ** 2 + (y - last_y) ** 2 > spacing * spacing:
             path.append((x, y))
     return path

@@ -116,7 +116,9 @@ class SightingMemory:
 
     def take(self, step: I64, index: I32, distinct: I64) -> None:
         """Add sightings; see `fleet2d.algorithms.observations.SightingTable`."""
-        room = kernels.rooms_at(self._room_of_place, distinct[:, Column.X], distinct[:, Column.Y])
+        x = distinct[:, Column.X]
+        y = distinct[:, Column.Y]
+        room = kernels.rooms_at(self._room_of_place, x, y)
         identity = distinct[:, Column.IDENTITY]
         if not len(step):
             return

@@ -36,7 +36,8 @@ class Population(ResidentBehavior):
         group: str = self.group
         if group == "any":  # by its share of the people
             names = survey.groups()
-            shares = [survey.table()["groups"][name]["share"] for name in names]
+            groups = survey.table()["groups"]
+            shares = [groups[name]["share"] for name in names]
             group = names[draw_weighted(draws, shares)]
         self.people = survey.group(group)
         self.works_at_home = survey.draw_works_at_home(self.people, draws)
@@ -65,7 +66,8 @@ class Population(ResidentBehavior):
         state = survey.first_state(people, draws, ordinal)
         episodes, _ = survey.draw_episodes(people, draws, ordinal, state)
         time_s = (time - datetime.fromordinal(ordinal)) // timedelta(seconds=1)
-        return rooms_at(survey.to_activities(people, episodes, False, draws), time_s, known)
+        activities = survey.to_activities(people, episodes, False, draws)
+        return rooms_at(activities, time_s, known)
 
     def day(self, ordinal: int) -> Sequence[Episode]:
         """Return what is done from 04:00 on the day of a date's ordinal to 04:00 on the next."""

@@ -50,8 +50,8 @@ class Reactions(Behavior):
         """Determine the manners, which may be those of a persona, and return their distances."""
         personas = (getattr(behavior, "resolved_persona", None) for behavior in actor.behaviors)
         persona = next((p for p in personas if p is not None), None)
-        self.used_manners = self.manners or getattr(persona, "manners", None) or Manners()
-        manners = self.used_manners
+        manners: Manners = self.manners or getattr(persona, "manners", None) or Manners()
+        self.used_manners = manners
         self.durations = {
             "looks": manners.looks.table(),
             "leaves": LEAVES_FOR.table(),
@@ -61,13 +61,12 @@ class Reactions(Behavior):
         self.rank = 0
         self.until = -1
         units = actor.home.plan.lattice.units_per_m
-        used = self.used_manners
         return Attention(
-            notices=round(used.notices * units),
-            in_way=round(used.in_the_way * units),
-            too_close=round(used.too_close * units),
-            patience=max(1, -(-micros(used.patience) // actor.clock.step_us)),
-            hears=round(used.hears * units),
+            notices=round(manners.notices * units),
+            in_way=round(manners.in_the_way * units),
+            too_close=round(manners.too_close * units),
+            patience=max(1, actor.clock.step_at_or_after(micros(manners.patience))),
+            hears=round(manners.hears * units),
         )
 
     def reacts_to(self, actor: Actor, event: SightEvent, step: int) -> bool:
@@ -102,11 +101,12 @@ class Reactions(Behavior):
     def _come(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
         plan.note(EventKind.REACTS, f"comes to {event.user}")
         self._maybe_stop(now, draws)
-        at_x, at_y = _robot(now, event)
         distance_m = max(MEET_M, self.used_manners.too_close + CLEAR_M)
-        points = [p for p in self._points_around(now, (at_x, at_y), distance_m) if plan.reaches(*p)]
-        if points:
-            plan.go_to_point(*min(points, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y)))
+        points = self._points_around(now, _robot(now, event), distance_m)
+        within_reach = [point for point in points if plan.reaches(*point)]
+        if within_reach:
+            nearest = min(within_reach, key=lambda p: _squared(p[0] - plan.x, p[1] - plan.y))
+            plan.go_to_point(*nearest)
         self._look_at(now, plan, event, self.durations["comes"], draws)
 
     def _leave(self, now: Situation, plan: Plan, event: SightEvent, draws: Draws) -> None:
@@ -121,14 +121,16 @@ class Reactions(Behavior):
         """Step out of the robot's way, to a random free point beside it."""
         plan.note(EventKind.REACTS, f"steps aside for {event.user}")
         at_x, at_y = _robot(now, event)
-        dx, dy = plan.x - at_x, plan.y - at_y
-        # Across the robot's way; along it, the robot would come closer again.
-        across = [
-            (x, y)
-            for x, y in self._points_around(now, plan.position, STEP_M)
-            if 4 * ((x - plan.x) * dx + (y - plan.y) * dy) ** 2
-            <= _squared(dx, dy) * _squared(x - plan.x, y - plan.y)
-        ]
+        dx = plan.x - at_x
+        dy = plan.y - at_y
+        across = []
+        for x, y in self._points_around(now, plan.position, STEP_M):
+            step_x = x - plan.x
+            step_y = y - plan.y
+            along = step_x * dx + step_y * dy
+            # Across the robot's way; along it, the robot would come closer again.
+            if 4 * along**2 <= _squared(dx, dy) * _squared(step_x, step_y):
+                across.append((x, y))
         if across:
             plan.go_to_point(*draws.choice(across))
         plan.stay(PASSING_TIME)

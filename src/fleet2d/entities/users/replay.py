@@ -84,9 +84,8 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
     lattice = actor.home.plan.lattice
     space = actor.space
     size = 1 << 20  # beyond any home, within 64 bits when squared
-    points: I64 = np.clip(
-        lattice.to_lattice(np.clip(xy, -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)), -size, size
-    )
+    clipped = np.clip(xy, -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
+    points: I64 = np.clip(lattice.to_lattice(clipped), -size, size)
     fits = [
         0 <= x < size and 0 <= y < size and space.part_at(x, y) == actor.part
         for x, y in points.tolist()
@@ -214,14 +213,16 @@ class FixFollower:
         if leave_us > plan.time_us:
             rows.append([leave_us, plan.x, plan.y, plan.heading, 0])
         done = 0.0
-        for (x, y), length, (dx, dy) in zip(
-            route[1:-1].tolist(), lengths[:-1].tolist(), moves[1:].tolist(), strict=True
-        ):
+        corners = route[1:-1].tolist()
+        before = lengths[:-1].tolist()
+        after = moves[1:].tolist()
+        for (x, y), length, (dx, dy) in zip(corners, before, after, strict=True):
             done += length
             at_us = leave_us + int((arrive_us - leave_us) * (done / total))
             rows.append([at_us, x, y, int(heading_of(dx, dy)), 0])
         last = self._row(j, arrive_us)
-        plan.follow(np.concatenate([np.array(rows, np.int64).reshape(-1, 5), last]))
+        breakpoints = np.array(rows, np.int64).reshape(-1, 5)
+        plan.follow(np.concatenate([breakpoints, last]))
 
 
 # In visits shorter than this, the body stops at the nearest point of the room [us].
@@ -303,15 +304,16 @@ class RoomFollower:
         arrive_us = visit.first * self.step_us
         may_leave = max(plan.time_us, before.keep * self.step_us)
         if before.place == AWAY:
-            back_us = max(plan.time_us, min((before.last + 1) * self.step_us, arrive_us - 1))
+            ends_us = (before.last + 1) * self.step_us
+            back_us = max(plan.time_us, min(ends_us, arrive_us - 1))
             plan.jump(back_us, away=0).note(EventKind.CAME_HOME)
             may_leave = max(plan.time_us, may_leave)
         spot = self._spot(visit, plan)
         rows = self._way(plan, spot)
         lasts_us = (visit.keep - visit.first) * self.step_us
-        if visit.place not in (DOOR, AWAY) and (
-            rows[-1, 0] > arrive_us - may_leave or lasts_us < BRIEF_VISIT_US
-        ):
+        is_late = rows[-1, 0] > arrive_us - may_leave
+        hurries = is_late or lasts_us < BRIEF_VISIT_US
+        if hurries and visit.place not in (DOOR, AWAY):
             rows = self._way(plan, self._near(plan, spot))
         self._set_out(plan, rows, may_leave, arrive_us, before)
         if visit.place == AWAY:

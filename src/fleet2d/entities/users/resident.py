@@ -6,7 +6,6 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence, Se
 from contextlib import suppress
 from datetime import datetime
 from functools import lru_cache, partial
-from operator import attrgetter
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from fleet2d import kernels
 from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms
-from fleet2d.entities.plan import Plan, new_note
+from fleet2d.entities.plan import Plan, PlanEnd, new_note
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.lattice import LatticePoint
@@ -99,19 +98,22 @@ class Spots:
     def nearest(self, rooms: list[Room], x: int, y: int) -> Room:
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
         at_x, at_y = self._actor.home.plan.lattice.xy_of(x, y)
-        return min(rooms, key=lambda r: (r.anchor_xy[0] - at_x) ** 2 + (r.anchor_xy[1] - at_y) ** 2)
+
+        def squared_distance(room: Room) -> float:
+            middle_x, middle_y = room.anchor_xy
+            return (middle_x - at_x) ** 2 + (middle_y - at_y) ** 2
+
+        return min(rooms, key=squared_distance)
 
     def in_room(self, room: Room) -> list[Spot]:
         """Return the body's habitual spots of a room as it is at present, at least one."""
         self._check_version()
         if room.index not in self._of_room:
-            space = self._actor.space
-            part = self._actor.part
-            grid = self._actor.home.cached(
-                ("spots", space, part, room.index, self.members), lambda: self._grid(room)
-            )
+            actor = self._actor
+            key = "spots", actor.space, actor.part, room.index, self.members
+            grid = actor.home.cached(key, lambda: self._grid(room))
             own = part_of(grid, self.rank, self.members)
-            draws = Draws(self._actor.stream(f"spots of {room.name}"), 0)
+            draws = Draws(actor.stream(f"spots of {room.name}"), 0)
             self._of_room[room.index] = draws.shuffled(own)[:MAX_SPOTS]
         return self._of_room[room.index]
 
@@ -135,9 +137,11 @@ class Spots:
         if key not in self._at_furniture:
             rank, members = share or (self.rank, self.members)
             seats = seats_at(self._actor.home, activity, indices, members, self._can_reach)
-            if self.apart and len(seats) <= rank % members and not FIXTURES.intersection(kinds):
-                seats = []
-            self._at_furniture[key] = list(part_of(seats, rank, members)) if seats else []
+            lacks_own = self.apart and len(seats) <= rank % members
+            if not seats or (lacks_own and FIXTURES.isdisjoint(kinds)):
+                self._at_furniture[key] = []
+            else:
+                self._at_furniture[key] = list(part_of(seats, rank, members))
         return self._at_furniture[key]
 
     def _check_version(self) -> None:
@@ -153,8 +157,7 @@ class Spots:
 
     def _can_reach(self, use: UsePlace) -> bool:
         """Return whether the body can get to a place at furniture, or close enough to use it."""
-        at = (use.x, use.y) if use.approach is None else use.approach
-        return self._actor.space.part_about(at) == self._actor.part
+        return self._actor.space.part_about(use.approach or use.at) == self._actor.part
 
     def _grid(self, room: Room) -> tuple[Spot, ...]:
         """Return the spots of a room: a grid of cells, a finer one in a small room."""
@@ -164,7 +167,7 @@ class Spots:
         pitch = math.ceil(SPACING / lattice.cell)
         while pitch:
             half = pitch // 2
-            on_grid = cells[(cells[:, 0] % pitch == half) & (cells[:, 1] % pitch == half)]
+            on_grid = cells[(cells % pitch == half).all(axis=1)]
             if len(on_grid) >= self.members:
                 return tuple(Spot(*lattice.cell_centre(*cell)) for cell in on_grid.tolist())
             pitch = half
@@ -192,8 +195,8 @@ def seats_at(
     """
     seats: list[Seat] = []
     for kind in activity.objects:
-        for thing in (thing for thing in home.objects if thing.type == kind):
-            room = home.room_of(thing)
+        for thing in home.objects:
+            room = home.room_of(thing) if thing.type == kind else None
             if room is not None and room.index in indices:
                 usable = [i for i, use in enumerate(thing.uses) if can_reach(use)]
                 fit = [i for i in usable if thing.uses[i].posture == activity.posture]
@@ -242,8 +245,6 @@ class Venue(NamedTuple):
     fetch_takes: Distribution | None
 
 
-PlanEnd = tuple[int, int, int, int, int]
-"""Time [us], x, y [lattice], heading [1/4096 turn], and whether the body is away."""
 Course = tuple[PlanEnd, int, list[tuple[int, int]], list[tuple[int, int, int]]]
 """The end of a plan, its posture, and the postures and notes that were added; see `Resident`."""
 Stint = tuple[CoreVenue, int, int, int, bool]
@@ -291,7 +292,8 @@ class KnownHome:
         go = self.update().go
         walk = partial(self._walk, plan)
         now = _end_of(plan)
-        self._take(plan, go(self, walk, plan.legs, *now, self.in_core(activity, venue), draws))
+        core_venue = self.in_core(activity, venue)
+        self._take(plan, go(self, walk, plan.legs, *now, core_venue, draws))
 
     def update(self) -> Resident:
         """Forget an earlier arrangement of doors and furniture; return the body for the core."""
@@ -313,8 +315,9 @@ class KnownHome:
         """Return the venue of an activity as the core needs it, after an `update`."""
         key: Hashable = name
         if venue is not self._person.venues.get(name):
-            rooms, stores = ([room.index for room in each] for each in (venue.rooms, venue.stores))
-            key = name, tuple(rooms), tuple(venue.seats), tuple(stores)
+            rooms = tuple(room.index for room in venue.rooms)
+            stores = tuple(room.index for room in venue.stores)
+            key = name, rooms, tuple(venue.seats), stores
         if key not in self._core_venues:
             self._core_venues[key] = self._make_core_venue(name, venue)
         return self._core_venues[key]
@@ -390,7 +393,7 @@ class KnownHome:
     def _take(self, plan: Plan, course: Course) -> None:
         """Let a plan go on with what the core added to it."""
         end, posture, postures, notes = course
-        plan.time_us, plan.x, plan.y, plan.heading, plan.away = end
+        plan.end = end
         plan.posture = POSTURES[posture]
         plan.postures += postures
         names = list(self._names)
@@ -403,14 +406,13 @@ class KnownHome:
 
 
 def _end_of(plan: Plan) -> tuple[PlanEnd, int]:
-    now = plan.time_us, plan.x, plan.y, plan.heading, plan.away
-    return now, POSTURES.index(plan.posture)
+    return plan.end, POSTURES.index(plan.posture)
 
 
 # Draws of an episode are addressed by the day's ordinal times this, plus its number. A day has
 # fewer episodes than half of it: the core adds the other half for the part of one after midnight.
 EPISODES_PER_DAY = 1024
-END = attrgetter("end")
+
 # How far ahead people plan who may be interrupted by robots at any time.
 AHEAD_US = 1800 * SECOND_US
 
@@ -479,7 +481,7 @@ class ResidentBehavior(Behavior):
                 note = f"activities.{name}.rooms: left out, because this home has no {rooms}"
                 actor.notes.append(note)
                 self.venues[name] = self.venues[REST]
-        exclusive = (s for s in self.venues.values() if s.activity.exclusive)
+        exclusive = (venue for venue in self.venues.values() if venue.activity.exclusive)
         self.private_rooms = {room.index for venue in exclusive for room in venue.rooms}
         if sleeps_in is not None:
             self.venues[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
@@ -508,13 +510,16 @@ class ResidentBehavior(Behavior):
         clock = now.actor.clock
         self.is_hindered = now.home.may_block_routes  # by shut doors, for all of the plan
         midnight_us = clock.elapsed(next_midnight(now.time))
-        last_us = min(plan.time_us + AHEAD_US, midnight_us) if now.actor.attention else midnight_us
+        last_us = midnight_us
+        if now.actor.attention:
+            last_us = min(plan.time_us + AHEAD_US, midnight_us)
         self.known_home.update()
         stints = []
         for which, episode in self._episodes(now.time):
-            if clock.reading(which[0], episode.begin) >= last_us:
+            ordinal, _ = which
+            if clock.reading(ordinal, episode.begin) >= last_us:
                 break
-            end_us = min(clock.reading(which[0], episode.end), midnight_us)
+            end_us = min(self._end_us(ordinal, episode), midnight_us)
             stints.append(self._stint(episode, which, end_us))
         self.known_home.live(plan, stints, last_us, continues=now.step == self.planned_until)
         self.planned_until = clock.step_at_or_after(plan.time_us)
@@ -546,8 +551,8 @@ class ResidentBehavior(Behavior):
         while True:
             day = self.day(ordinal)
             first = bisect_right(day, now_us, key=partial(self._end_us, ordinal))
-            for i in range(first, len(day)):
-                yield (ordinal, i), day[i]
+            for number in range(first, len(day)):
+                yield (ordinal, number), day[number]
             ordinal += 1
 
     def _end_us(self, ordinal: int, episode: Episode) -> int:
@@ -565,7 +570,8 @@ class ResidentBehavior(Behavior):
         core_venue = self.known_home.in_core(activity, self.seated(venue, which))
         is_short = end - begin < NO_GAP_S
         stays = activity == REST and is_short and not self.makes_room(which)
-        return core_venue, which[0] * EPISODES_PER_DAY + which[1], end_us, role, stays
+        ordinal, number = which
+        return core_venue, ordinal * EPISODES_PER_DAY + number, end_us, role, stays
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
         """Return the venue with only the places at furniture that it has for the episode."""
@@ -602,10 +608,14 @@ class ResidentBehavior(Behavior):
         if activity.choose == "own":
             rooms = self._own_rooms(actor, activity)
         else:
-            named = (r for name in names for r in self.reachable_rooms if r.is_called(name))
+            reachable = self.reachable_rooms
+            named = (room for name in names for room in reachable if room.is_called(name))
             rooms = list(dict.fromkeys(named)) or _match(actor, Activity(rooms=names))[1]
-        means = {kind: getattr(activity, kind) for kind in MOVE_KINDS if self.small_moves}
-        moves = ((kind, max(1, seconds(mean))) for kind, mean in means.items() if mean is not None)
+        moves = []
+        for kind in MOVE_KINDS if self.small_moves else ():
+            mean = getattr(activity, kind)
+            if mean is not None:
+                moves.append((kind, max(1, seconds(mean))))
         seats = self.spots.at_furniture(activity, rooms)
         if not activity.fetches:
             return Venue(activity, rooms, seats, [], tuple(moves), None)
@@ -656,8 +666,11 @@ def rooms_for(activity: Activity, home: Home, reachable: list[Room]) -> tuple[st
     )
     if activity.objects and activity.first == "furniture":
         for name in activity.rooms:
-            kinds = set(activity.objects) - ({"chair"} if name == "any" else set())
-            used = {home.room_of(t) for t in home.objects if t.type in kinds and t.uses}
+            kinds = set(activity.objects)
+            if name == "any":
+                kinds.discard("chair")
+            things = (thing for thing in home.objects if thing.type in kinds and thing.uses)
+            used = {home.room_of(thing) for thing in things}
             with suppress(PlacementError):  # it has no such room
                 furnished = [room for room in match((name,))[1] if room in used]
                 if furnished:

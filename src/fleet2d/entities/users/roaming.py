@@ -63,8 +63,8 @@ class RoomSampling(Behavior):
     def start(self, actor: Actor) -> None:
         """Find the rooms; those of a kind have equal parts of its share."""
         names = [(name,) for name in self.shares if name != AWAY]
-        available = {name for (name,) in available_places(actor, "room_sampling.shares", names)}
-        shares = {n: share for n, share in self.shares.items() if n == AWAY or n in available}
+        available = {(AWAY,), *available_places(actor, "room_sampling.shares", names)}
+        shares = {name: share for name, share in self.shares.items() if (name,) in available}
         total = sum_in_order(shares.values())
         if total <= 0:
             raise PlacementError(
@@ -93,7 +93,8 @@ class RoomSampling(Behavior):
         return plan
 
     def _visit(self, actor: Actor, plan: Plan, draws: Draws) -> None:
-        room = list(self.chances)[draw_weighted(draws, list(self.chances.values()))]
+        number = draw_weighted(draws, list(self.chances.values()))
+        room = list(self.chances)[number]
         dwell_us = self.dwell_time.draw(draws) * SECOND_US
         if room is None:
             if not plan.away:
@@ -101,7 +102,8 @@ class RoomSampling(Behavior):
                 plan.leave_home()
             plan.stay(timedelta(microseconds=dwell_us))
             return
-        self._walk(actor, plan, draws.choice(self.spots.in_room(actor.home.rooms[room])))
+        spots = self.spots.in_room(actor.home.rooms[room])
+        self._walk(actor, plan, draws.choice(spots))
         owed = self.debt_us[room]
         stay_us = max(dwell_us - owed, SHORTEST_US)
         self.debt_us[room] = owed - (dwell_us - stay_us)
@@ -127,15 +129,16 @@ def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
     """Return the index of each room on a route, and its share of the route's length."""
     plan = actor.home.plan
     legs = np.diff(route, axis=0).astype(np.float64)
-    lengths = np.sqrt(legs[:, 0] * legs[:, 0] + legs[:, 1] * legs[:, 1])
-    steps = np.maximum(lengths * (POINTS_PER_M / plan.lattice.units_per_m), 1).astype(np.int64)
+    lengths = np.sqrt((legs * legs).sum(axis=1))
+    points_per_unit = POINTS_PER_M / plan.lattice.units_per_m
+    steps = np.maximum(lengths * points_per_unit, 1).astype(np.int64)
     points = []
     for leg in range(len(legs)):
         along = (np.arange(steps[leg]) + 0.5) / steps[leg]
         points.append(route[leg] + along[:, None] * legs[leg])
-    cells = np.concatenate(points).astype(np.int64) // UNITS_PER_CELL
+    column, row = (np.concatenate(points).astype(np.int64) // UNITS_PER_CELL).T
     weight = np.repeat(lengths / steps, steps)
-    rooms = plan.room_of_place[cells[:, 1], cells[:, 0]]
+    rooms = plan.room_of_place[row, column]
     total = np.cumsum(weight)[-1]
     if not total > 0:
         return []

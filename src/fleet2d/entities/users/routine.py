@@ -52,7 +52,8 @@ def private_rooms(household: Household, home: Home) -> MemberRooms:
                 private.update(indices)
     result = {}
     for member, of_member in rooms.items():
-        result[member] = {a: each for a, each in of_member.items() if private.issuperset(each)}
+        activities = of_member.items()
+        result[member] = {a: indices for a, indices in activities if private.issuperset(indices)}
     return result
 
 
@@ -106,6 +107,11 @@ class SeatClaim(NamedTuple):
     seats: Sequence[Seat]
     own: int
 
+    @property
+    def precedence(self) -> tuple[bool, int, int]:
+        """By what claims are sorted: the first one has its place."""
+        return not self.is_asleep, self.begin, self.rank
+
 
 class Seating:
     """The places at furniture that members of a household have on each day.
@@ -125,8 +131,8 @@ class Seating:
         self._members = {i: name for i, name in enumerate(names) if name in actor.people}
         users = actor.path.rpartition(".")[0]
         self._paths = {i: f"{users}.{name}" for i, name in self._members.items()}
-        self._keys = {i: stream_key(actor.seed, p, "seat") for i, p in self._paths.items()}
         self._seed = actor.seed
+        self._keys = {i: stream_key(self._seed, p, "seat") for i, p in self._paths.items()}
         self._count = len(names)
         self._objects: object = None  # the furniture that the places are of
 
@@ -170,12 +176,13 @@ class Seating:
         for spot, times in self._taken.items():
             self._taken[spot] = [(begin, end) for begin, end in times if end > yesterday]
         places: dict[tuple[int, int], Seat | None] = {}
-        for claim in sorted(self._claims(ordinal), key=lambda c: (not c.is_asleep, *c[1:3])):
+        for claim in sorted(self._claims(ordinal), key=lambda claim: claim.precedence):
             address = ordinal * EPISODES_PER_DAY + claim.episodes[0]
             first = Draws(self._keys[claim.rank], address).below(claim.own)
             seats = (claim.seats[first], *claim.seats[:first], *claim.seats[first + 1 :])
-            seat = next((s for s in seats if self._is_free(s, claim)), None)
-            places |= {(claim.rank, number): seat for number in claim.episodes}
+            seat = next((seat for seat in seats if self._is_free(seat, claim)), None)
+            for number in claim.episodes:
+                places[claim.rank, number] = seat
             if seat is not None:
                 self._taken.setdefault(self._spot[seat], []).append((claim.begin, claim.end))
         return places
@@ -247,12 +254,13 @@ def _spots(objects: Sequence[PlacedObject]) -> dict[Seat, Seat]:
     """Return the first of the places at which bodies would touch, as of a table and its chairs."""
     points: dict[Seat, Point] = {}
     spots = {}
-    for seat, use in ((Seat(t.name, i), use) for t in objects for i, use in enumerate(t.uses)):
-        at = use.x, use.y
-        near = (other for other, point in points.items() if math.dist(at, point) < TOUCHING_M)
-        spots[seat] = next(near, seat)
-        if spots[seat] is seat:
-            points[seat] = at
+    for thing in objects:
+        for number, use in enumerate(thing.uses):
+            seat = Seat(thing.name, number)
+            near = (other for other, at in points.items() if math.dist(use.at, at) < TOUCHING_M)
+            spots[seat] = next(near, seat)
+            if spots[seat] is seat:
+                points[seat] = use.at
     return spots
 
 
@@ -395,8 +403,8 @@ class Routine(ResidentBehavior):
         today = time.toordinal()
         time_s = (written(time) - midnight_of(time)) // timedelta(seconds=1)
         if time_s < likely_day(today)[0].begin:
-            today = today - 1
-            time_s = time_s + DAY_S
+            today -= 1
+            time_s += DAY_S
         day = self._with_absences(likely_day(today), today)
         return resident.rooms_at(day, time_s, self._activities())
 
@@ -417,7 +425,8 @@ class Routine(ResidentBehavior):
         rank = self.spots.rank
         members = self.spots.members
         turn = begin_us // TURN_US
-        begins_us = max(begin_us, (turn + (rank - turn) % members) * TURN_US)
+        own_turn = turn + (rank - turn) % members
+        begins_us = max(begin_us, own_turn * TURN_US)
         ends_us = begins_us + takes_us + 2 * WAY_US
         if ends_us > (begins_us // TURN_US + 1) * TURN_US:
             begins_us = (begins_us // TURN_US + members) * TURN_US
@@ -443,9 +452,11 @@ class Routine(ResidentBehavior):
 
     def makes_room(self, which: tuple[int, int]) -> bool:
         """Return whether members of its household may want to use the bathroom that it was in."""
-        if self.household is None or which[1] == 0:
+        ordinal, number = which
+        if self.household is None or number == 0:
             return False
-        return self.venues[self.day(which[0])[which[1] - 1].activity].activity.exclusive
+        before = self.day(ordinal)[number - 1]
+        return self.venues[before.activity].activity.exclusive
 
     def _with_absences(self, day: Sequence[Episode], ordinal: int) -> Sequence[Episode]:
         if not self.away and not self.visits:
