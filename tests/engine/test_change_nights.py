@@ -7,6 +7,8 @@ from tests.change_nights import CHANGED_RULES, MINUTE, ZONES, nights
 from tests.thorough import some
 
 import fleet2d
+from fleet2d.logs.layout import read_log
+from fleet2d.logs.log import in_run
 
 HOURS = 26
 STEPS = HOURS * 60
@@ -86,3 +88,24 @@ def test_schedule_door_log_and_expectation_are_in_local_time(night, tmp_path):
     violations = run.arrow("violations").to_pylist() if "violations" in run.tables else []
     ends = [k for k in range(STEPS) if inside[k] and not (k + 1 < STEPS and inside[k + 1])]
     assert [(v["step"], v["last_step"]) for v in violations] == list(zip(begins, ends, strict=True))
+
+
+ROOMS = "2011-{0}-26 07:00:00 Kitchen K ON Cook\n2011-{0}-27 09:00:00 Bedroom B ON Sleep\n"
+FIXES = "time,x,y\n2011-{0}-26 07:00:00,1,1\n2011-{0}-27 09:00:00,2,2\n"
+
+
+@pytest.mark.parametrize("start", ["2026-03-28", "2026-10-24", "2026-06-01"])
+@pytest.mark.parametrize("month", ["01", "03", "06"])  # on 27 March 2011 clocks were put forward
+@pytest.mark.parametrize(("name", "text"), [("log.txt", ROOMS), ("log.csv", FIXES)])
+def test_a_log_of_other_days_keeps_what_its_clock_read(name, text, month, start, tmp_path):
+    path = tmp_path / name
+    path.write_text(text.format(month))
+    settings = {"start": start, "duration": "2 d", "time_zone": "Europe/Berlin"}
+    loaded = fleet2d.load_scenario({"simulation": settings, "floorplan": "bundled"})
+    clock = loaded.simulation.clock
+    log, begin_us, _ = in_run(read_log(path, time_zone=clock.zone), 0, clock)
+    elapsed = (log.moments()[0] - begin_us) // clock.step_us
+    assert [f"{clock.time(int(step)):%d %H:%M}" for step in elapsed] == [
+        f"{start[-2:]} 07:00",
+        f"{int(start[-2:]) + 1:02} 09:00",
+    ]

@@ -13,7 +13,7 @@ import pytest
 import fleet2d
 from fleet2d.errors import InputError
 from fleet2d.logs.layout import read_log
-from fleet2d.logs.log import PositionLog, begin_of_run
+from fleet2d.logs.log import PositionLog, in_run
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 IDS = [
@@ -149,7 +149,7 @@ def verdict(variant):
         )
         assert isinstance(log, PositionLog)
         plan = replay.frame.in_unit(log.unit_m).to_plan(log.xy)
-        begin_us, _ = begin_of_run(log, replay.day, loaded.simulation.clock)
+        log, begin_us, _ = in_run(log, replay.day, loaded.simulation.clock)
     except InputError as error:
         return f"refused: {error}"
     seconds = [(time - variant.times[0]).total_seconds() for time in variant.times]

@@ -15,7 +15,7 @@ from fleet2d.entities.entity import SIGHTING, EvidenceSource
 from fleet2d.errors import errors_as
 from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
 from fleet2d.kernels import SightingColumn as Column
-from fleet2d.logs.log import Day, LogError, LogKeys, begin_of_run, files_of
+from fleet2d.logs.log import Day, LogError, LogKeys, files_of, in_run
 from fleet2d.logs.placement import COORDINATE_LIMIT_M, MAX_OUTSIDE, LogFrame
 from fleet2d.storage.bags import is_bag
 
@@ -89,7 +89,7 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         clock = actor.clock
         frame = self.frame.in_unit(log.unit_m)
         identity = identities(log.labels, log.counts, self.people, users)[log.label]
-        begin_us, outside_notes = begin_of_run(log, self.day, clock)
+        log, begin_us, outside_notes = in_run(log, self.day, clock)
         step = (log.time_us - begin_us) // clock.step_us
         used = (step >= 0) & (step < clock.steps)
         xy = frame.to_plan(log.xy)

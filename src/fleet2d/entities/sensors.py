@@ -1,5 +1,6 @@
 """Sensors of a home: of doors, seats, appliances and motion, real ones, and those of a log."""
 
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from fleet2d.entities.sensor import FurnitureSensor, Sensor, SensorView, first_c
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I64, TURN, Bool, half_sine, region_contains_points, visible_region
-from fleet2d.logs.log import Day, LogError, LogKeys, PositionLog, begin_of_run
+from fleet2d.logs.log import Day, LogError, LogKeys, PositionLog, by_clock_of_run, in_run
 from fleet2d.runtime.clock import Clock
 
 NAMES = {
@@ -264,17 +265,18 @@ class ReplaySensor(Sensor, LogKeys):
             chosen = table.rows_of("sensor", self.sensor)
         # The table may be of many sensors: its days, and its end, are those of all.
         whole = stamps.local(self.path, "rows", np.ones(count, bool), [], time_zone=zone, sort=True)
-        nothing = np.zeros((len(whole.row), 2))
+        nothing = np.zeros((count, 2))
         log = PositionLog(
             self.path, "readings", whole.first_day, whole.time_us, nothing, nothing[:, 0]
         )
-        begin_us, notes = begin_of_run(log, self.day, clock)
         said: list[str] = []
         local = stamps.local(self.path, "readings", chosen, said, time_zone=zone, sort=self.sort)
+        _, begin_us, notes = in_run(log, self.day, clock)
+        time_us = by_clock_of_run(replace(log, time_us=local.time_us), self.day, clock).time_us
         notes = (*notes, *(said if clock.zone else ()))
         states = table.column("state").to_pylist()
         on = [_is_on(states[row], self.path, table.line[row]) for row in local.row.tolist()]
-        self._steps = (local.time_us - begin_us) // clock.step_us
+        self._steps = (time_us - begin_us) // clock.step_us
         self._on = np.array([bool(state) for state in on], bool)
         begins = self._steps.clip(0, clock.steps)
         ends = np.append(begins[1:], clock.steps)

@@ -3,13 +3,13 @@
 import codecs
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta, timezone
 from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 from pydantic import Field
@@ -18,11 +18,11 @@ from fleet2d.bounds import LOG_BYTES, LOG_DAYS, LOG_ROWS, check_file, one_line
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import counted
 from fleet2d.configuration.units import micros
-from fleet2d.errors import InputError, os_errors_as
+from fleet2d.errors import InputError, errors_as, os_errors_as
 from fleet2d.inputs import open_input
 from fleet2d.kernels import F64, I64
-from fleet2d.runtime.clock import DAY_US, Clock, midnight_of
-from fleet2d.runtime.local_time import Zone, at_reading
+from fleet2d.runtime.clock import DAY, DAY_US, Clock, midnight_of
+from fleet2d.runtime.local_time import Zone, at_reading, wall_us
 from fleet2d.storage.bags import is_bag
 
 # Maximum number of lines that a note lists.
@@ -177,6 +177,21 @@ class ActivityLog:
         begins, ends = np.array(pairs, np.int64).reshape(-1, 2).T
         return begins, ends
 
+    def moved(self, move: Callable[[I64], I64]) -> Self:
+        """Return the log with other times."""
+        parts = (_moved(readings, move) for readings in (self.readings, self.sensors))
+        return replace(self, readings=next(parts), sensors=next(parts))
+
+
+def _moved(readings: Sequence[Reading], move: Callable[[I64], I64]) -> tuple[Reading, ...]:
+    begins = np.maximum.accumulate(move(np.array([r.begin_us for r in readings], np.int64)))
+    ends = move(np.array([r.end_us for r in readings], np.int64))
+    times = zip(begins.tolist(), np.maximum(begins, ends).tolist(), strict=True)
+    return tuple(
+        reading._replace(begin_us=begin, end_us=end)
+        for reading, (begin, end) in zip(readings, times, strict=True)
+    )
+
 
 @dataclass(frozen=True)
 class PositionLog:
@@ -216,15 +231,22 @@ class PositionLog:
         """Return the time of each fix, as its beginning and its end."""
         return self.time_us, self.time_us
 
+    def moved(self, move: Callable[[I64], I64]) -> Self:
+        """Return the log with other times; those since its beginning are no readings of a clock."""
+        if self.first_day is None:
+            return self
+        return replace(self, time_us=np.maximum.accumulate(move(self.time_us)))
+
 
 Day = int | Literal["date", "weekday"]
 """The day of a log that is the first of the run: a number, its date, or the same weekday."""
 
 
-def begin_of_run(
-    log: ActivityLog | PositionLog, day: Day, clock: Clock
-) -> tuple[int, tuple[str, ...]]:
-    """Return the moment of a log that is step 0 of a run [us since the log's first midnight].
+Log = TypeVar("Log", bound=ActivityLog | PositionLog)
+
+
+def in_run(log: Log, day: Day, clock: Clock) -> tuple[Log, int, tuple[str, ...]]:
+    """Return a log by the clock of a run, and the moment of it that is step 0 of the run.
 
     Args:
         log: The log.
@@ -232,23 +254,17 @@ def begin_of_run(
         clock: The steps of the run.
 
     Returns:
-        The moment, and a note on what lies outside of the run, if anything does.
+        The log, the moment [us since the log's first midnight], and a note on what lies outside of
+        the run, if anything does.
 
     Raises:
         LogError: All of the log lies outside of the run, or it has no dates.
     """
     start = clock.start
+    number = _number_of(log, day, clock)
+    log = by_clock_of_run(log, day, clock)
+    begin_us = micros(start - at_reading(start, midnight_of(start) - number * DAY))
     begins, ends = log.moments()
-    if isinstance(day, str):
-        if log.first_day is None:
-            raise LogError(f"day: {day} needs a log with dates, and this one has none")
-        ahead = (start.date() - log.first_day).days
-        day = ahead if day == "date" else ahead % 7
-    midnight = at_reading(start, midnight_of(start))
-    begin_us = day * DAY_US + micros(start - midnight)
-    if log.first_day and day == (start.date() - log.first_day).days:
-        first_midnight = datetime.combine(log.first_day, datetime.min.time())
-        begin_us = micros(start - at_reading(start, first_midnight))
     end_us = begin_us + clock.steps * clock.step_us
     first, last = int(begins.min()), int(ends.max())
     if last < begin_us or first >= end_us:
@@ -256,17 +272,65 @@ def begin_of_run(
         of_log = f"{_moment(clock, first - begin_us)} to {_moment(clock, last - begin_us)}"
         of_run = f"{_moment(clock, 0)} to {_moment(clock, end_us - begin_us)}"
         raise LogError(
-            f"the run begins on day {day} of the log, which has the days 0 to"
+            f"the run begins on day {number} of the log, which has the days 0 to"
             f" {log.days - 1}{since}: by the calendar of the run, the log is from {of_log}, the run"
             f" from {of_run}; choose another 'day', or set simulation.start"
         )
     early = np.count_nonzero(ends < begin_us)
     late = np.count_nonzero(begins >= end_us)
     if not early + late:
-        return begin_us, ()
-    return begin_us, (
-        f"of {len(begins)} {log.noun}, {early} are before the run and {late} after its end",
-    )
+        return log, begin_us, ()
+    outside = f"{early} are before the run and {late} after its end"
+    return log, begin_us, (f"of {len(begins)} {log.noun}, {outside}",)
+
+
+def by_clock_of_run(log: Log, day: Day, clock: Clock) -> Log:
+    """Return a log with what its clock read as the clock of a run reads it, on other days.
+
+    A clock may be changed in the nights of the log, of the run, or of neither. Of an hour that the
+    log's clock read twice, the second time comes at the end of the first.
+    """
+    midnight = midnight_of(clock.start) - _number_of(log, day, clock) * DAY
+    if clock.zone is None or log.first_day == midnight.date():
+        return log
+    move = _Move(log.first_day, midnight, clock.zone)
+    return cast("Log", log.moved(move.moments))  # of a union, the checker forgets which
+
+
+def _number_of(log: ActivityLog | PositionLog, day: Day, clock: Clock) -> int:
+    """Return the number of the day of a log that is the first of a run."""
+    if isinstance(day, str):
+        if log.first_day is None:
+            raise LogError(f"day: {day} needs a log with dates, and this one has none")
+        ahead = (clock.start.date() - log.first_day).days
+        day = ahead if day == "date" else ahead % 7
+    with errors_as(LogError, f"day: {day} is out of range", of=OverflowError):
+        midnight_of(clock.start) - day * DAY
+    return day
+
+
+class _Move(NamedTuple):
+    """The move of a log to other days: times since its first midnight become those of the run.
+
+    Attributes:
+        first_day: The date of its first day; None: its times are what a clock reads.
+        midnight: The midnight that begins its first day in the run.
+        zone: The clock of the home.
+    """
+
+    first_day: date | None
+    midnight: datetime
+    zone: Zone
+
+    def moments(self, time_us: I64) -> I64:
+        """Return when the clock of the run first reads what the clock of the log did."""
+        read_us = time_us
+        if self.first_day is not None and len(time_us):
+            first_us = wall_us(datetime.combine(self.first_day, datetime.min.time()))
+            zone = self.zone.over(first_us, first_us + int(time_us.max()))
+            read_us = zone.readings(time_us + zone.utc_us(first_us)) - first_us
+        midnight_us = wall_us(self.midnight)
+        return self.zone.moments(read_us + midnight_us) - self.zone.utc_us(midnight_us)
 
 
 def _moment(clock: Clock, elapsed_us: int) -> str:

@@ -28,8 +28,8 @@ from fleet2d.logs.log import (
     LogError,
     LogKeys,
     PositionLog,
-    begin_of_run,
     files_of,
+    in_run,
 )
 from fleet2d.logs.placement import (
     COORDINATE_LIMIT_M,
@@ -513,7 +513,7 @@ class Replay(Behavior, LogKeys):
                 frame=self.frame.name,
                 **self.reading(actor.clock),
             )
-            begin_us, outside_notes = begin_of_run(log, self.day, actor.clock)
+            log, begin_us, outside_notes = in_run(log, self.day, actor.clock)
             if isinstance(log, ActivityLog):
                 self._start_rooms(actor, log, begin_us)
             else:
