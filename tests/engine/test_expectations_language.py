@@ -10,6 +10,7 @@ import fleet2d
 from fleet2d.errors import InputError, ScenarioError
 from fleet2d.expectations import at_end, distance, room, speed
 from fleet2d.expectations.parse import parse_expectation
+from fleet2d.expectations.verdict import check_judged
 
 CAMERA = {"range": [0.2, 4], "angle_deg": 120}
 WHOLE_HOME = [[0, 0], [20, 0], [20, 20], [0, 20]]
@@ -309,3 +310,8 @@ def test_a_robot_is_no_faster_than_its_speed_by_the_rounding_of_positions(step, 
     simulation.run()
 
     assert all(verdict.holds for verdict in simulation.verdicts().values())
+
+
+def test_a_sum_of_each_day_needs_an_operator_that_says_when_it_is_judged():
+    with pytest.raises(InputError, match=r"says nothing of each day: write always\(count\("):
+        check_judged(parse_expectation("count(moving(astro), per=day) < 3"))

@@ -275,8 +275,14 @@ def _sums_at_end(expectation: Expectation) -> Expectation:
         return replace(expectation, one=one, other=other)
     if isinstance(expectation, Not):
         return ~_sums_at_end(expectation.part)
-    is_sum = isinstance(expectation, SignalComparison) and isinstance(expectation.signal, Total)
-    return at_end(expectation) if is_sum else expectation
+    if not isinstance(expectation, SignalComparison) or not isinstance(expectation.signal, Total):
+        return expectation
+    if (per := expectation.signal.per) is not None:
+        raise InputError(
+            f"{expectation} says nothing of each {per}: write always({expectation}), which judges"
+            f" each step by its {per} so far, or at_end({expectation}) for the last {per} alone"
+        )
+    return at_end(expectation)
 
 
 def amount(value: float, unit: str) -> str:
