@@ -54,7 +54,7 @@ def _type_of(column: Column) -> pa.DataType:
 
 def schema_of(spec: TableSpec) -> pa.Schema:
     """Return the Arrow schema of a table; its metadata holds the whole spec."""
-    fields = [pa.field(c.name, _type_of(c), c.nullable, _metadata(c)) for c in spec.columns]
+    fields = [_field_of(column) for column in spec.columns]
     return pa.schema(fields, {"fleet2d.table": spec.name, "description": spec.description})
 
 
@@ -72,10 +72,15 @@ def spec_of(schema: pa.Schema) -> TableSpec:
         raise ArtifactError("this table was not stored by Fleet2D: read it with pyarrow") from error
 
 
-def _metadata(column: Column) -> dict[str, str]:
-    categories = json.dumps(column.categories) if column.categories else ""
-    values = {"unit": column.unit, "description": column.description, "categories": categories}
-    return {"kind": column.kind, **{key: value for key, value in values.items() if value}}
+def _field_of(column: Column) -> pa.Field:
+    texts = {
+        "kind": column.kind,
+        "unit": column.unit,
+        "description": column.description,
+        "categories": json.dumps(column.categories) if column.categories else "",
+    }
+    metadata = {key: text for key, text in texts.items() if text}
+    return pa.field(column.name, _type_of(column), column.nullable, metadata)
 
 
 def _column_of(field: pa.Field) -> Column:
@@ -117,9 +122,10 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
                 f"{column.name} is more than 2 GiB of text at once: append fewer rows at a time"
             )
         # A cast of large strings would do, but it imports pyarrow.compute: a tenth of a second.
-        text = pa.py_buffer(ends.astype(np.int32)), pa.py_buffer(np.ascontiguousarray(chunk.values))
+        offsets = pa.py_buffer(ends.astype(np.int32))
+        text = pa.py_buffer(np.ascontiguousarray(chunk.values))
         bitmap = None if missing is None else _bits(~missing)
-        return pa.StringArray.from_buffers(len(chunk.lengths), *text, bitmap)
+        return pa.StringArray.from_buffers(len(chunk.lengths), offsets, text, bitmap)
     if dictionary is not None:
         codes = number_array(chunk.values, pa.int32(), missing)
         return pa.DictionaryArray.from_arrays(codes, dictionary)
@@ -138,7 +144,8 @@ def number_array(values: NDArray[Any], kind: pa.DataType, missing: Bool | None =
 
 def string_array(words: Sequence[str | None]) -> pa.Array:
     """Return texts, or None where there is none, as an array; see `number_array`."""
-    return _array_of(encode_strings(words, nullable=None in words), Column("words", "string"), None)
+    chunk = encode_strings(words, nullable=None in words)
+    return _array_of(chunk, Column("words", "string"), None)
 
 
 def _bits(flags: Bool) -> pa.Buffer:
@@ -157,7 +164,8 @@ def chunks_of(table: pa.Table, spec: TableSpec, words: Words) -> Iterator[tuple[
             f"but has {', '.join(table.column_names)}"
         )
     for batch in table.to_batches():
-        chunk = {c.name: _chunk_of(batch.column(i), c, words) for i, c in enumerate(spec.columns)}
+        arrays = zip(spec.columns, batch.columns, strict=True)
+        chunk = {column.name: _chunk_of(array, column, words) for column, array in arrays}
         yield chunk, batch.num_rows
 
 
@@ -170,8 +178,8 @@ def _chunk_of(array: pa.Array, column: Column, words: Words) -> ColumnChunk:
         return ColumnChunk(_codes_of(array, column, words), valid)
     if column.kind == "string":
         strings = array.cast(pa.large_string()).fill_null("")
-        ends = np.frombuffer(strings.buffers()[1], np.int64)[strings.offset :][: len(strings) + 1]
-        data = strings.buffers()[2]
+        _, offsets, data = strings.buffers()
+        ends = np.frombuffer(offsets, np.int64)[strings.offset :][: len(strings) + 1]
         text = np.empty(0, np.uint8) if data is None else np.frombuffer(data, np.uint8)
         return ColumnChunk(text[ends[0] : ends[-1]], valid, np.diff(ends))
     if column.kind == "time":
@@ -244,16 +252,15 @@ class ParquetTable:
         self.partial = directory / f"{spec.name}.parquet{PARTIAL}"
         self._is_published = False
         self._schema = schema_of(spec)
-        sorted_kinds = ("step", "time")
+        texts = [column.name for column in spec.columns if column.kind in ("category", "string")]
+        ascending = [column.name for column in spec.columns if column.kind in ("step", "time")]
         self._writer = pq.ParquetWriter(
             self.partial,
             self._schema,
             compression="zstd",
             compression_level=1,
-            use_dictionary=[c.name for c in spec.columns if c.kind in ("category", "string")],
-            column_encoding={
-                c.name: "DELTA_BINARY_PACKED" for c in spec.columns if c.kind in sorted_kinds
-            },
+            use_dictionary=texts,
+            column_encoding=dict.fromkeys(ascending, "DELTA_BINARY_PACKED"),
         )
 
     def write(self, chunk: Chunk, rows: int, words: Words) -> None:
@@ -317,10 +324,9 @@ def _check_columns(path: Path, schema: pa.Schema, kinds: Mapping[str, Kind]) -> 
             " the file was changed"
         )
     for field, kind in zip(schema, kinds.values(), strict=True):
-        is_zoned = kind == "time" and field.type == pa.timestamp(
-            "us", getattr(field.type, "tz", None)
-        )
-        if field.type != _TYPES[kind] and not is_zoned:
+        zone = getattr(field.type, "tz", None)
+        stored = pa.timestamp("us", zone) if kind == "time" else _TYPES[kind]
+        if field.type != stored:
             raise ArtifactError(
                 f"{path}: the column {field.name} is {field.type}, but {_TYPES[kind]} was stored:"
                 " the file was changed"
@@ -377,9 +383,10 @@ def with_categories(table: pa.Table) -> pa.Table:
         no_codes = number_array(np.empty(0, np.int32), pa.int32(), None)
         first = pa.DictionaryArray.from_arrays(no_codes, string_array(column.categories))
         chunks = pa.chunked_array([first, *table.column(i).chunks]).unify_dictionaries().chunks
-        if not column.is_growing and len(chunks[0].dictionary) > len(column.categories):
-            name = chunks[0].dictionary[len(column.categories)]
-            raise ArtifactError(f"column {column.name!r} has no category {name.as_py()!r}")
+        names = chunks[0].dictionary
+        known = len(column.categories)
+        if not column.is_growing and len(names) > known:
+            raise ArtifactError(f"column {column.name!r} has no category {names[known].as_py()!r}")
         values = pa.chunked_array(chunks[1:], _TYPES["category"])
         table = table.set_column(i, table.schema.field(i), values)
     return table

@@ -259,6 +259,13 @@ FILE_NAME = "manifest.json"
 FLOORPLAN_NAME = "floorplan.json"
 """The floor plan in a run directory, in Fleet2D's own format."""
 LEARNED_NAME = "learned"
+
+
+def learned_files(root: Path) -> set[str]:
+    """Return the files with learned states in a run directory, by their paths in it."""
+    return {f"{LEARNED_NAME}/{path.name}" for path in (root / LEARNED_NAME).glob("*.npz")}
+
+
 """The folder in a run directory of what algorithms have learned."""
 
 # Problems of one manifest that a message lists, at most.
@@ -313,7 +320,10 @@ class TableRecord(Record):
 
 def table_record(spec: TableSpec, rows: int, digest: str) -> TableRecord:
     """Return the record of a table with the columns of its spec."""
-    columns = [ColumnRecord(name=c.name, kind=c.kind, unit=c.unit) for c in spec.columns]
+    columns = [
+        ColumnRecord(name=column.name, kind=column.kind, unit=column.unit)
+        for column in spec.columns
+    ]
     return TableRecord(rows=rows, digest=digest, columns=columns)
 
 
@@ -522,7 +532,9 @@ def problems_of(error: ValidationError) -> str:
         value = value if len(value) <= _MAX_CHARACTERS else f"{value[:_MAX_CHARACTERS]}…"
         lines.append(f"{key}: {line['msg']}, got {value}"[:300])
     more = error.error_count() - len(lines)
-    return "; ".join([*lines, *([f"and {more} more"] if more > 0 else [])]).replace(".;", ";")
+    if more > 0:
+        lines.append(f"and {more} more")
+    return "; ".join(lines).replace(".;", ";")
 
 
 def _damaged(path: Path, reason: str) -> RunDirectoryError:

@@ -12,11 +12,11 @@ import numpy as np
 
 from fleet2d.artifacts.manifest import (
     FLOORPLAN_NAME,
-    LEARNED_NAME,
     FileRecord,
     Manifest,
     Seal,
     TableRecord,
+    learned_files,
     table_record,
 )
 from fleet2d.artifacts.table import Chunk, TableSpec, Words, new_dictionaries
@@ -36,7 +36,7 @@ class TableDigest:
         """Start with no rows."""
         self.spec = spec
         self.rows = 0
-        self._hashes = {name: [hashlib.sha256() for _ in range(3)] for name in spec.names}
+        self._hashes = {name: _new_hashes() for name in spec.names}
 
     def update(self, chunk: Chunk, rows: int) -> None:
         """Add the next `rows` rows."""
@@ -60,6 +60,11 @@ class TableDigest:
             digest = sha256_of([hashes, list(names)])
             columns.append((column.name, column.kind, column.nullable, digest))
         return sha256_of([self.spec.name, self.rows, columns])
+
+
+def _new_hashes() -> tuple[hashlib._Hash, ...]:
+    """Return a hash each for values, validity and lengths."""
+    return hashlib.sha256(), hashlib.sha256(), hashlib.sha256()
 
 
 def run_digest(tables: Mapping[str, str]) -> str:
@@ -124,8 +129,8 @@ def make_seal(manifest: Manifest, directory: Path) -> Seal:
     Raises:
         OSError: A file can't be read.
     """
-    names = {FLOORPLAN_NAME, *(f"{name}.parquet" for name in manifest.tables)}
-    names |= {f"{LEARNED_NAME}/{path.name}" for path in (directory / LEARNED_NAME).glob("*.npz")}
+    tables = (f"{name}.parquet" for name in manifest.tables)
+    names = {FLOORPLAN_NAME, *tables, *learned_files(directory)}
     paths = {name: directory / name for name in sorted(names)}
     files = {name: file_record(path) for name, path in paths.items() if path.exists()}
     fields = digest_fields(manifest.content())
@@ -147,8 +152,11 @@ def digest_fields(content: Mapping[str, Any]) -> dict[str, str]:
             parts |= {f"{name}.{key}": entry for key, entry in value.items()}
         else:
             parts[name] = value
-    # The order of the keys of a scenario has an effect on the run.
-    return {n: sha256_of(part, ordered=n.startswith("scenario")) for n, part in parts.items()}
+    digests = {}
+    for name, part in parts.items():
+        # The order of the keys of a scenario has an effect on the run.
+        digests[name] = sha256_of(part, ordered=name.startswith("scenario"))
+    return digests
 
 
 def file_record(path: Path) -> FileRecord:
@@ -160,4 +168,5 @@ def file_record(path: Path) -> FileRecord:
 
 def seal_digest(fields: Mapping[str, str], files: Mapping[str, FileRecord]) -> str:
     """Return the digest of a seal, from those of fields and files."""
-    return sha256_of([dict(fields), {name: record.model_dump() for name, record in files.items()}])
+    records = {name: record.model_dump() for name, record in files.items()}
+    return sha256_of([dict(fields), records])

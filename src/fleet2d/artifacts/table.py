@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -386,8 +387,8 @@ class TableBuffer:
             reuse: Whether the next rows may overwrite the arrays that are returned: the caller no
                 longer needs them by then.
         """
-        columns = self.spec.columns
-        chunk = {c.name: self._rows_of(c, 0) if self.rows else empty_chunk(c) for c in columns}
+        read = partial(self._rows_of, start=0) if self.rows else empty_chunk
+        chunk = {column.name: read(column) for column in self.spec.columns}
         self.rows = 0
         if not reuse:
             # The next rows are likely to be as many.
@@ -524,7 +525,8 @@ def _as_strings(column: Column, strings: Any) -> Any:
         strings = strings.tolist()  # a scalar if it has no dimension
     if strings is not None and not isinstance(strings, str):
         strings = list(strings)
-    types = set(map(type, strings if isinstance(strings, list) else [strings])) - {str}
+    given = strings if isinstance(strings, list) else [strings]
+    types = {*map(type, given)} - {str}
     if not types:
         return strings
     if types == {type(None)} and not column.nullable:

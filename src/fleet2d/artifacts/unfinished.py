@@ -120,7 +120,8 @@ def last_commit(path: Path) -> Commit | None:
                 names.append(_spec_of(frame.content).name)
             if frame.kind == "commit":
                 step, rows = frame.description
-                commit = Commit(int(step), dict(zip(names, map(int, rows), strict=True)), frame.end)
+                rows_of_tables = dict(zip(names, map(int, rows), strict=True))
+                commit = Commit(int(step), rows_of_tables, frame.end)
     return commit
 
 
@@ -141,10 +142,11 @@ def read_rows(path: Path, end: int) -> Iterator[LoggedRows]:
             if frame.end > end:
                 break
             if frame.kind == "table":
-                specs.append(_spec_of(frame.content))
-                if specs[-1].name in [spec.name for spec in specs[:-1]]:
-                    raise ValueError(f"two tables have the name {specs[-1].name}")
-                words.append(new_dictionaries(specs[-1]))
+                added = _spec_of(frame.content)
+                if added.name in [spec.name for spec in specs]:
+                    raise ValueError(f"two tables have the name {added.name}")
+                specs.append(added)
+                words.append(new_dictionaries(added))
             if frame.kind == "rows":
                 number, rows, added_words = frame.description
                 spec = specs[number]
@@ -298,7 +300,8 @@ def _grow(content: bytes, dtype: np.dtype[Any], rows: int) -> NDArray[Any]:
 def _repeat(content: bytes, dtype: np.dtype[Any], runs: int, rows: int) -> NDArray[Any]:
     """Return the values of run lengths, each repeated by its length."""
     middle = runs * dtype.itemsize
-    lengths = np.frombuffer(content[middle:], _narrow((len(content) - middle) // max(1, runs)))
+    width = (len(content) - middle) // max(1, runs)
+    lengths = np.frombuffer(content[middle:], _narrow(width))
     # Before anything is repeated: a few bytes must not request all memory.
     if len(lengths) != runs or int(lengths.sum(dtype=np.int64)) != rows:
         raise ValueError(f"{runs} runs don't make {rows} values")

@@ -96,7 +96,8 @@ def descriptions(cls: type) -> dict[str, str]:
     for base in reversed(cls.__mro__):
         if base is BaseModel:
             continue
-        _, _, section = inspect.cleandoc(vars(base).get("__doc__") or "").partition("Attributes:\n")
+        docstring = inspect.cleandoc(vars(base).get("__doc__") or "")
+        _, _, section = docstring.partition("Attributes:\n")
         for names, text in _ENTRY.findall(section.partition("\n\n")[0]):
             texts |= dict.fromkeys(names.split(", "), " ".join(text.split()))
     return texts
@@ -241,7 +242,8 @@ def split_short_form(data: Any, body_fields: Iterable[str]) -> Any:
     if "behaviors" in data:
         raise problem_at(("behaviors",), "give 'type' (one behavior) or 'behaviors', not both")
     body = {key: value for key, value in data.items() if key in set(body_fields)}
-    return {**body, "behaviors": [{k: v for k, v in data.items() if k not in body}]}
+    behavior = {key: value for key, value in data.items() if key not in body}
+    return {**body, "behaviors": [behavior]}
 
 
 class ShortForm:
@@ -448,7 +450,8 @@ def lookup(kind: str, name: str) -> type[Component]:
 def components(kind: str) -> dict[str, type[Component]]:
     """Return every component of a kind, built in or from an entry point, by name, sorted."""
     types = {cls.type_name: cls for cls in map(_built_in, COMPONENTS.get(kind, {}).values())}
-    plugins = {e.name: lookup(kind, e.name) for e in _plugins(kind) if _is_there(e)}
+    entries = filter(_is_there, _plugins(kind))
+    plugins = {entry.name: lookup(kind, entry.name) for entry in entries}
     return dict(sorted((plugins | types).items()))
 
 

@@ -198,7 +198,8 @@ class _Builder:
         if isinstance(node, yaml.MappingNode):
             content: Any = self._mapping(node, location)
         else:
-            content = [self.build(n, (*location, str(i))) for i, n in enumerate(node.value)]
+            items = enumerate(node.value)
+            content = [self.build(item, (*location, str(number))) for number, item in items]
         self._parents.pop()
         return content
 
@@ -303,7 +304,8 @@ class Document:
         depth = len(nearest)
         inner_places = [inner for key, inner in self.places.items() if key[:depth] == nearest]
         first = {_file(inner): inner for inner in reversed(inner_places)}
-        changes = [inner for file, inner in first.items() if file not in ("", _file(place))][::-1]
+        known = ("", _file(place))
+        changes = [inner for file, inner in first.items() if file not in known][::-1]
         if not depth or not changes:
             return place
         return f"{place}, changed by {' and '.join(changes)}" if place else changes[0]
@@ -410,7 +412,7 @@ def _read_text(path: Path, title: str) -> str:
     try:
         return read_bytes(path, FILE_BYTES, ScenarioError).decode("utf-8-sig")
     except FileNotFoundError:
-        near = [str(p) for p in sorted(path.parent.glob("*.y*ml"))] if path.parent.is_dir() else []
+        near = sorted(path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
         raise ScenarioError(f"there is no file {title}{did_you_mean(path, near)}") from None
     except IsADirectoryError:
         raise ScenarioError(f"{title} is a folder; name the YAML file in it") from None

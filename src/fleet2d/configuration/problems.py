@@ -35,9 +35,8 @@ def problem_at(
     """Return the error that a validator raises about a key within its value; see `problem`."""
     from pydantic_core import InitErrorDetails, ValidationError
 
-    return ValidationError.from_exception_data(
-        "", [InitErrorDetails(type=problem(message, group), loc=location, input=value)]
-    )
+    line = InitErrorDetails(type=problem(message, group), loc=location, input=value)
+    return ValidationError.from_exception_data("", [line])
 
 
 def unknown_key(key: object, known: Iterable[str]) -> "PydanticCustomError":
@@ -72,9 +71,8 @@ def rewrite(
         if kind not in own_kinds:
             # The message comes last: braces within it are not placeholders.
             context = {key: context[key] for key in context if key != "message"}
-            details["type"] = PydanticCustomError(
-                kind, "{message}", {**context, "message": line["msg"]}
-            )
+            context["message"] = line["msg"]
+            details["type"] = PydanticCustomError(kind, "{message}", context)
         lines.append(change(details))
     return ValidationError.from_exception_data(error.title, lines)
 
@@ -114,11 +112,11 @@ def did_you_mean(name: object, known: Iterable[object]) -> str:
     ": did you mean 'speed'?"
     """
     name = str(name)[:60]
-    names = [str(k) for k in known]
-    longer = [k for k in names if str(name) and k.startswith(f"{name}_")]
+    names = list(map(str, known))
+    longer = [other for other in names if name and other.startswith(f"{name}_")]
     import difflib  # only messages need it
 
-    near = longer or difflib.get_close_matches(str(name), names, n=1)
+    near = longer or difflib.get_close_matches(name, names, n=1)
     return f": did you mean {near[0]!r}?" if near else "."
 
 

@@ -176,10 +176,10 @@ class Quantity:
         if isinstance(value, str):
             return self._parse_text(value)
         if isinstance(value, Mapping) and value:
-            return sum(
-                (self._number(n, value) * self._unit(u, value) for u, n in value.items()),
-                Fraction(0),
-            )
+            total = Fraction(0)
+            for unit, number in value.items():
+                total += self._number(number, value) * self._unit(unit, value)
+            return total
         return self._without_unit(self._number(value, value), value)
 
     def _without_unit(self, number: Fraction, value: object) -> Fraction:
@@ -198,9 +198,8 @@ class Quantity:
             if len(part[1]) > MAX_DIGITS:
                 raise problem(f"expected at most {MAX_DIGITS} digits in a row, got {shown(text)}")
             number = Fraction(part[1])
-            total += (
-                number * self._unit(part[2], text) if part[2] else self._without_unit(number, text)
-            )
+            unit = part[2]
+            total += number * self._unit(unit, text) if unit else self._without_unit(number, text)
             position = part.end()
         return total
 
@@ -238,15 +237,13 @@ class Quantity:
 
     def schema(self, *others: dict[str, Any]) -> WithJsonSchema:
         """Return the JSON Schema of the quantity, or `others`; ``x-quantity`` is its short name."""
+        _, name = self.name.split(" ", 1)
+        number = {"const": 0} if self.asked else {"type": "number"}
         return WithJsonSchema(
             {
                 "description": f"{self.name}: {self._forms()}",
-                "x-quantity": self.name.split(" ", 1)[1] + (f" [{self.base}]" if self.base else ""),
-                "anyOf": [
-                    {"const": 0} if self.asked else {"type": "number"},
-                    {"type": "string"},
-                    *others,
-                ],
+                "x-quantity": f"{name} [{self.base}]" if self.base else name,
+                "anyOf": [number, {"type": "string"}, *others],
                 "examples": list(self.examples),
             }
         )
@@ -374,8 +371,9 @@ def format_duration(duration: timedelta) -> str:
     """
     count = micros(duration)
     for unit, seconds in (("d", DAY_S), ("h", HOUR_S), ("min", 60)):
-        if count and count % (seconds * 10**6) == 0:
-            return f"{count // (seconds * 10**6)} {unit}"
+        units, rest = divmod(count, seconds * 10**6)
+        if count and not rest:
+            return f"{units} {unit}"
     return f"{_plain(Decimal(count).scaleb(-6))} s"
 
 

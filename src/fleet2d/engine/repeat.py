@@ -20,6 +20,7 @@ from fleet2d.artifacts.manifest import (
     SLOW,
     Manifest,
     input_record,
+    learned_files,
 )
 from fleet2d.artifacts.store import RunStore, cannot_write
 from fleet2d.artifacts.unfinished import FOLDER, UnfinishedRun, remove_leftovers
@@ -290,15 +291,14 @@ def _repeatable(notes: list[str]) -> list[str]:
 
 def _files(old: Path, new: Path) -> list[str]:
     """Return the files beside the tables whose bytes differ: the plan, and learned states."""
-    names = {FLOORPLAN_NAME}
-    for root in (old, new):
-        names |= {f"{LEARNED_NAME}/{path.name}" for path in (root / LEARNED_NAME).glob("*.npz")}
-    pairs = {name: (path_in(old, name), new / name) for name in sorted(names)}
-    return [
-        name
-        for name, (before, after) in pairs.items()
-        if not (before.is_file() and after.is_file() and filecmp.cmp(before, after, shallow=False))
-    ]
+    differing = []
+    for name in sorted({FLOORPLAN_NAME, *learned_files(old), *learned_files(new)}):
+        before = path_in(old, name)
+        after = new / name
+        are_there = before.is_file() and after.is_file()
+        if not are_there or not filecmp.cmp(before, after, shallow=False):
+            differing.append(name)
+    return differing
 
 
 def _other_versions(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:

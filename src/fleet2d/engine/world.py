@@ -40,7 +40,7 @@ from fleet2d.interventions.intervention import (
 )
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import KINDS, Event, EventKind
-from fleet2d.sight.camera import Disturbance, FalseSighting
+from fleet2d.sight.camera import Disturbance, FalseSighting, dark_cameras
 
 
 class EngineWorld:
@@ -93,8 +93,7 @@ class EngineWorld:
         for cameras in self._state.cameras:
             if cameras.row == row:
                 cameras.disturb(disturbances)
-        darkness = [disturbance for disturbance in disturbances if disturbance.dark]
-        dark = {name for each in darkness for name in eyes if each.is_of(name)}
+        dark = dark_cameras(eyes, disturbances)
         for area in self._state.layers.areas:
             if area.row == row:
                 area.darken(dark)

@@ -486,18 +486,18 @@ class Answers(Component):
         """Give a part without a type the type of its name."""
         if not isinstance(data, Mapping):
             return data
+        typed = dict(data)
         types = {name: name for name in PARTS} | {"months": "fading", "initiative": "rates"}
-        return {
-            name: {"type": types[name], **value}
-            if name in types and isinstance(value, Mapping)
-            else value
-            for name, value in data.items()
-        }
+        for name, kind in types.items():
+            if isinstance(data.get(name), Mapping):
+                typed[name] = {"type": kind, **data[name]}
+        return typed
 
     def chance(self, stage: Stage, now: Circumstances, state: AttitudeState) -> float:
         """Return the probability of a stage."""
         parts = (getattr(self, name) for name in PARTS)
-        return logistic(sum_in_order(p.logit(now, state) for p in parts if p.stage == stage))
+        terms = (part.logit(now, state) for part in parts if part.stage == stage)
+        return logistic(sum_in_order(terms))
 
     def reply(
         self, now: Circumstances, state: AttitudeState, seed: int, path: str, step: int

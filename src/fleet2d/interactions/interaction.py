@@ -126,12 +126,15 @@ class Interaction(Settings):
         days = units.weekdays_of(self.on)
         if self.every is not None:
             passed = max(timedelta(0), after - start)
-            moments_of_run = (start + n * self.every for n in count(-(-passed // self.every)))
-            yield from (moment for moment in moments_of_run if moment.weekday() in days)
+            for number in count(-(-passed // self.every)):
+                moment = start + number * self.every
+                if moment.weekday() in days:
+                    yield moment
         for midnight in midnights(after):
-            if midnight.weekday() in days:
-                moments = (at_reading(start, midnight + at) for at in sorted(self.at))
-                yield from (moment for moment in moments if moment >= after)
+            for at in sorted(self.at) if midnight.weekday() in days else ():
+                moment = at_reading(start, midnight + at)
+                if moment >= after:
+                    yield moment
 
 
 @dataclass
@@ -261,7 +264,8 @@ class RequestQueue:
 
     def next_ready(self, time: datetime) -> datetime | None:
         """Return when a request that has to wait may be tried again; None: none has to."""
-        return min((r.not_before for r in self.open if r.not_before > time), default=None)
+        times = (request.not_before for request in self.open)
+        return min((at for at in times if at > time), default=None)
 
     def reopen(self, request: Request, time: datetime) -> None:
         """Want again what was accepted, as it wasn't carried out, unless it is too late."""

@@ -20,7 +20,7 @@ from fleet2d.interventions.bodies import BodyIntervention, Put, behavior_number,
 from fleet2d.interventions.intervention import Lasting, World, body, robot, user
 from fleet2d.kernels import turn_between
 from fleet2d.runtime.events import EventKind
-from fleet2d.sight.camera import Disturbance, FalseSighting
+from fleet2d.sight.camera import Disturbance, FalseSighting, dark_cameras
 from fleet2d.sight.perception import Perception
 
 UNKNOWN = "unknown"
@@ -151,7 +151,7 @@ class KeepOut(RobotIntervention, Lasting):
         others = {room for act in self.active(world) for room in act._banned_rooms}
         for room in self._banned_rooms:
             if room not in others:
-                actor.bans = {r: until for r, until in actor.bans.items() if r != room}
+                actor.bans.pop(room, None)
                 world.emit(self.entity, EventKind.ALLOWED, world.home.rooms[room].name)
         actor.decide_again(world.step)
 
@@ -274,14 +274,15 @@ class SwitchOn(Switch):
 
     def begin(self, world: World) -> None:
         """Switch it on."""
-        name = camera_name(self.camera)
-        world.undo(
-            lambda act: (
-                isinstance(act, SwitchOff)
-                and (act.entity, act.behavior) == (self.entity, self.behavior)
-                and (name is None or camera_name(act.camera) in (None, name))
-            )
-        )
+        world.undo(self._switches_on)
+
+    def _switches_on(self, act: object) -> bool:
+        """Return whether it undoes an intervention."""
+        if not isinstance(act, SwitchOff):
+            return False
+        names = {camera_name(self.camera), camera_name(act.camera)} - {None}
+        is_same = (act.entity, act.behavior) == (self.entity, self.behavior)
+        return is_same and len(names) <= 1
 
 
 class Trouble(RobotIntervention, Lasting):
@@ -577,8 +578,11 @@ class Perceive(RobotIntervention):
 
     def begin(self, world: World) -> None:
         """Let it perceive them."""
-        detections = [false_sighting(d.user, (d.x, d.y), d.heading_deg) for d in self.detections]
-        world.perceive(self.entity, detections)
+        sightings = [
+            false_sighting(each.user, (each.x, each.y), each.heading_deg)
+            for each in self.detections
+        ]
+        world.perceive(self.entity, sightings)
 
 
 def false_sighting(user: str, spot: tuple[float, float], heading_deg: float) -> FalseSighting:
@@ -612,11 +616,8 @@ class Relocalize(RobotIntervention):
 
     def _sees(self, world: World) -> bool:
         """Return whether one of its cameras isn't dark."""
-        disturbances = disturbances_of(world, self.entity)
-        return any(
-            not any(d.dark and d.is_of(name) for d in disturbances)
-            for name in self.actor(world).entity.eyes
-        )
+        eyes = self.actor(world).entity.eyes
+        return eyes.keys() != dark_cameras(eyes, disturbances_of(world, self.entity))
 
 
 class Kidnap(Trouble):

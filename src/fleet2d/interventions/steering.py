@@ -49,11 +49,9 @@ class Steer(RobotIntervention):
 def _bodies_near(actor: DecidingActor, world: World) -> list[Disc]:
     """Return where the robot would touch the other bodies that are at home."""
     units = actor.home.plan.lattice.units_per_m
-    others = [*world.users.values(), *world.robots.values()]
-    return [
-        Disc(
-            other.state.x, other.state.y, round((other.entity.radius + actor.entity.radius) * units)
-        )
-        for other in others
-        if other is not actor and not other.state.away
-    ]
+    discs = []
+    for other in (*world.users.values(), *world.robots.values()):
+        if other is not actor and not other.state.away:
+            reach_m = other.entity.radius + actor.entity.radius
+            discs.append(Disc(*other.state.position, round(reach_m * units)))
+    return discs

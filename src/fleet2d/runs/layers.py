@@ -24,7 +24,7 @@ def layer_steps(run: Run, name: str) -> list[int]:
     """
     table = _layer_table(run, name)
     begins = table["row"].to_numpy() == ALL_CELLS  # the first row of each step
-    return [int(step) for step in table["step"].to_numpy()[begins]]
+    return table["step"].to_numpy()[begins].tolist()
 
 
 def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
@@ -44,7 +44,8 @@ def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
     if step is None:
         step = steps[-1]
     if step not in steps:
-        listed = ", ".join(map(str, steps[:10])) + (", …" if len(steps) > 10 else "")
+        first = map(str, steps[:10])
+        listed = ", ".join([*first, "…"] if len(steps) > 10 else first)
         raise ArtifactError(
             f"the layer {name!r} was not stored at step {step}; stored steps: {listed}"
         )

@@ -46,7 +46,8 @@ def step_of(text: str, clock: Clock, option: str = "--at") -> int:
         )
     step = clock.step_at_or_after(elapsed)
     if not 0 <= step <= clock.steps:
-        begin, end = clock.start, clock.time(clock.steps)
+        begin = clock.start
+        end = clock.time(clock.steps)
         raise InputError(
             f"{option} {text!r} is not within the run, which lasts from {begin:%Y-%m-%d %H:%M} to"
             f" {end:%Y-%m-%d %H:%M}"
@@ -77,11 +78,12 @@ def _elapsed_us(text: str, clock: Clock) -> int | None:
     if step := _STEP.fullmatch(text):
         return int(step[1]) * clock.step_us
     if day := _DAY.fullmatch(text):
-        parts = [int(part or 0) for part in day.groups()[1:]]
-        if parts[0] > 24 or parts[1] > 59 or parts[2] > 59 or len(day[1]) > 6:
+        number, *parts = day.groups()
+        hour, minute, second = (int(part or 0) for part in parts)
+        if hour > 24 or minute > 59 or second > 59 or len(number) > 6:
             return None
         midnight = midnight_of(clock.start)
-        since = timedelta(days=int(day[1]) - 1, hours=parts[0], minutes=parts[1], seconds=parts[2])
+        since = timedelta(days=int(number) - 1, hours=hour, minutes=minute, seconds=second)
         return clock.elapsed(midnight + since)
     with suppress(ValueError):
         moment = datetime.fromisoformat(text)
@@ -132,7 +134,8 @@ def key_frame_rows(table: Any, first: int, end: int) -> I64:
     step = table["step"].to_numpy()
     entity, names = categories(table["entity"])
     kind, kinds = categories(table["kind"])
-    reached = kind != (kinds.index("planned") if "planned" in kinds else len(kinds))
+    planned = kinds.index("planned") if "planned" in kinds else len(kinds)
+    reached = kind != planned
     selected = np.zeros(len(step), np.bool_)
     for code in range(len(names)):
         rows = np.flatnonzero(entity == code)
@@ -140,7 +143,8 @@ def key_frame_rows(table: Any, first: int, end: int) -> I64:
         rows_after = rows[step[rows] >= end]
         low = rows_before[-1] if len(rows_before) else rows[0]
         high = rows_after[0] if len(rows_after) else rows[-1]
-        selected[rows[(rows >= low) & (rows <= high)]] = True
+        is_between = (rows >= low) & (rows <= high)
+        selected[rows[is_between]] = True
     return np.flatnonzero(selected)
 
 
@@ -178,7 +182,8 @@ def expand_walks(run: Run) -> Any:
     parts += [positions(run, name, interval) for name in walkers]
     # With plain strings and without metadata.
     texts = {"entity": pa.string(), "kind": pa.string()}
-    schema = pa.schema([(field.name, texts.get(field.name, field.type)) for field in table.schema])
+    fields = [(field.name, texts.get(field.name, field.type)) for field in table.schema]
+    schema = pa.schema(fields)
     return pa.concat_tables([part.cast(schema) for part in parts])
 
 

@@ -65,7 +65,7 @@ _UNWANTED = frozenset({"crash", "empty"})
 _FAULTS = frozenset({"fault", "switch_off"})
 _FIELDS_OF_RECORDS = frozenset({"do", "step", "entity", "by", "duration"})
 # The order at one step: what a decision is about comes before it, what comes of it after it.
-_ORDER = {name: i for i, name in enumerate(("power", "fault", "place", "sight", "decision"))}
+_ORDER = ("power", "fault", "place", "sight", "decision")
 # A move shorter than this is a turn on the spot [m].
 LEAST_MOVE_M = 0.05
 
@@ -144,7 +144,13 @@ def robot_log(
     if "key_frames" in run.tables:
         for move in moves_of(run, robot, first, end):
             entries += _of_move(move, run.clock)
-    return sorted(entries, key=lambda entry: (entry.step, _ORDER.get(entry.source, len(_ORDER))))
+    return sorted(entries, key=_rank)
+
+
+def _rank(entry: LogEntry) -> tuple[int, int]:
+    """Return by what the lines of a log are sorted."""
+    is_ranked = entry.source in _ORDER
+    return entry.step, _ORDER.index(entry.source) if is_ranked else len(_ORDER)
 
 
 def day_of(run: Run, number: int) -> tuple[int, int]:
@@ -243,7 +249,8 @@ def _of_events(rows: Iterable[Mapping[str, Any]], clock: Clock) -> Iterator[LogE
     for row in rows:
         kind = row["event"]
         step = row["step"]
-        text = " ".join(str(part) for part in (kind, row.get("user"), row["detail"]) if part)
+        parts = (kind, row.get("user"), row["detail"])
+        text = " ".join(filter(None, parts))
         level = _LEVELS.get(kind, INFO)
         if kind == EventKind.POWER_OFF:
             off_at = step
@@ -261,8 +268,9 @@ def _of_faults(
     for record in records:
         is_own = record.get("entity") == robot and record["do"] in _FAULTS
         if is_own and first <= record.get("step", 0) < end:
-            parts = {key: v for key, v in record.items() if key not in _FIELDS_OF_RECORDS}
-            what = ", ".join(k if v is True else f"{k} {v}" for k, v in parts.items())
+            parts = [key for key in record if key not in _FIELDS_OF_RECORDS]
+            says = [key if record[key] is True else f"{key} {record[key]}" for key in parts]
+            what = ", ".join(says)
             lasts = f" for {record['duration']}" if "duration" in record else ""
             yield LogEntry(record.get("step", 0), ERROR, "fault", f"{record['do']} {what}{lasts}")
 

@@ -137,15 +137,17 @@ class PathReader:
         out.x[:] = -1  # outside of the plan: what damaged key frames leave out
         with _damage():
             for key, last_key, begin, stop in self._segments:
-                low, high = -(-begin // stride) - before, -(-stop // stride) - before
+                low = -(-begin // stride) - before
+                high = -(-stop // stride) - before
                 part = slice(max(low, 0), min(high, len(steps)))
                 if part.start < part.stop:
                     x, y, heading, away = out
                     poses = Poses(x[part], y[part], heading[part], away[part])
                     self._trace(key, last_key, stop, steps[part], poses)
         rows, columns = plan.room_of_place.shape
-        cells = out.y // SUB, out.x // SUB
-        inside = (0 <= cells[0]) & (cells[0] < rows) & (0 <= cells[1]) & (cells[1] < columns)
+        row = out.y // SUB
+        column = out.x // SUB
+        inside = (0 <= row) & (row < rows) & (0 <= column) & (column < columns)
         if not inside.all():
             raise ArtifactError(
                 f"key_frames.parquet has poses of {self._entity} outside of the floor plan: it is"
@@ -153,7 +155,7 @@ class PathReader:
             )
         xs, ys = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1)).T
         is_away = out.away.astype(bool)
-        room = np.where(out.away, -1, plan.room_of_place[cells])
+        room = np.where(out.away, -1, plan.room_of_place[row, column])
         return Trajectory(steps, clock.times(steps), xs, ys, in_radians(out.heading), is_away, room)
 
     def _trace(self, begin: int, end: int, stop: int, steps: I64, out: Poses) -> None:
@@ -169,7 +171,7 @@ class PathReader:
             self._walker = _walker(self._run, self._plan, self._entity, self.clock)
         home, actor, behavior = self._walker
         step = int(keys["step"][begin])
-        state = Pose(*(int(keys[n][begin]) for n in ("x", "y", "heading", "away")))
+        state = Pose(*(int(keys[name][begin]) for name in Pose._fields))
         poses = empty_poses(stop - step + 1)
         trace_meander(home.barriers, actor.space.mesh, behavior.rule, step, state[:3], poses)
         # The stored end of the walk; a walk without a step ended as the body was put elsewhere.
@@ -182,7 +184,8 @@ class PathReader:
                     " another version"
                 )
         at = steps - step
-        out.x[:], out.y[:] = poses.x[at], poses.y[at]
+        out.x[:] = poses.x[at]
+        out.y[:] = poses.y[at]
         out.heading[:] = poses.heading[at]
         out.away[:] = poses.away[at]
 

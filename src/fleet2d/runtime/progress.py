@@ -3,7 +3,7 @@
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -35,7 +35,10 @@ def progress_bar(*, show: bool, counts: bool = True) -> "Iterator[Progress]":
     is_bar = show and sys.stderr.isatty()
     console = Console(stderr=True, soft_wrap=not is_bar)
     progress = Progress(*columns, console=console, transient=True, disable=not is_bar)
-    with progress if is_bar else _lines(progress) if show else nullcontext():
+    shown: AbstractContextManager[object] = nullcontext()
+    if show:
+        shown = progress if is_bar else _lines(progress)
+    with shown:
         yield progress
 
 

@@ -99,7 +99,8 @@ def _load(
         title = os.path.normpath(path) if bundled == str(source) else str(source)
         real = resolved(path, ScenarioError)
         if real in chain:
-            names = " → ".join(file.name for file in (*chain[chain.index(real) :], path))
+            circle = (*chain[chain.index(real) :], path)
+            names = " → ".join(file.name for file in circle)
             raise ScenarioError(f"{title} extends itself: {names}")
         EXTENDED_FILES.check(len(sizes) + 1, "the scenario", ScenarioError, prefix="at least ")
         document = read_document(path, title)
@@ -127,7 +128,8 @@ def _load(
 def _read_override(text: str) -> Document:
     key, equals, value = text.partition("=")
     keys = tuple(key.strip().split("."))
-    place = f"override {(text if len(text) <= 100 else one_line(text, 100))!r}"
+    written = text if len(text) <= 100 else one_line(text, 100)
+    place = f"override {written!r}"
     if not equals:
         raise ScenarioError(f"{place}: expected key.path=value, but there is no '='")
     right = re.sub(r"\[['\"]?(.*?)['\"]?\]", r".\1", key)
@@ -178,10 +180,10 @@ class _Merger:
         result = dict(base)
         for key, value in change.items():
             inner = (*keys, str(key))
-            is_old = key in result
-            result[key] = (
-                self.merge(result[key], value, inner) if is_old else self.replace(value, inner)
-            )
+            if key in result:
+                result[key] = self.merge(result[key], value, inner)
+            else:
+                result[key] = self.replace(value, inner)
         return result
 
     def merge_entries(self, base: list[Any], change: Mapping[str, Any], keys: Keys) -> list[Any]:
@@ -221,7 +223,8 @@ class _Merger:
             old_fields = {"type", *_type_fields(kind, base["type"])}
         elif "type" in change:
             # The type of an algorithm or a metric may be given by its name.
-            old, new = base.get("type", keys[-1]), change["type"]
+            old = base.get("type", keys[-1])
+            new = change["type"]
             if old != new:  # equal names need no class, which may be the user's code
                 cls = _class_of(kind, old)
                 if cls is None or cls is not _class_of(kind, new):
@@ -280,7 +283,8 @@ def _refuse_unknown_entries(base: Document, change: Document, changes: Sequence[
     for (section, name), part in parts.items():
         if section not in ENTRIES or (section, name) in set_keys or (section,) in set_keys:
             continue
-        names = [k for k, v in (base.data.get(section) or {}).items() if v is not None]
+        entries = base.data.get(section) or {}
+        names = [key for key, value in entries.items() if value is not None]
         entry = change.data[section][name]
         has_type = isinstance(entry, Mapping) and entry.keys() & {"type", "behaviors"}
         if name not in names and not has_type:
@@ -295,5 +299,6 @@ def _delete_nulls(data: dict[str, Any]) -> None:
     for section in [key for key, value in data.items() if value is None]:
         del data[section]
     for section in ENTRIES:
-        if isinstance(data.get(section), Mapping):
-            data[section] = {k: v for k, v in data[section].items() if v is not None}
+        entries = data.get(section)
+        if isinstance(entries, Mapping):
+            data[section] = {key: value for key, value in entries.items() if value is not None}

@@ -138,9 +138,9 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
     for line in lines[:MAX_LINES]:
         # A list is also called too short when all of its entries are wrong.
         depth = len(line["loc"])
-        if line["type"] == "too_short" and any(
-            entry["loc"][:depth] == line["loc"] for entry in lines if entry is not line
-        ):
+        others = (other for other in lines if other is not line)
+        has_entries = any(other["loc"][:depth] == line["loc"] for other in others)
+        if line["type"] == "too_short" and has_entries:
             continue
         location = _location_in(line, document.data)
         group = line.get("ctx", {}).get("group")
@@ -150,10 +150,10 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
         line["msg"] += _type_with_key(line, location, document.data)
         key = (document.place(location), one_line(".".join(map(str, location)), 200))
         problems.setdefault(key, []).append(line)
-    texts = [
-        ": ".join(part for part in (place, key, describe(*details)) if part)
-        for (place, key), details in problems.items()
-    ]
+    texts = []
+    for written_at, details in problems.items():
+        parts = (*written_at, describe(*details))
+        texts.append(": ".join(filter(None, parts)))
     if len(lines) >= MAX_LINES:
         texts.append("... and more: these are the first")
     return ScenarioError("\n".join(texts))
@@ -169,8 +169,9 @@ def describe(*lines: ErrorDetails) -> str:
         context = line.get("ctx", {})
         text = next((text for name, text in _EXPECTED.items() if kind.startswith(name)), None)
         if text is not None:
-            limits = {k: f"{v:g}" if isinstance(v, float) else v for k, v in context.items()}
-            expected.append(text.format(**limits))
+            limits = context.items()
+            short = {k: f"{v:g}" if isinstance(v, float) else v for k, v in limits}
+            expected.append(text.format(**short))
             value = line["input"]
             if kind == "literal_error" and isinstance(value, str):
                 choices += re.findall(r"'([^']*)'", context["expected"])
@@ -208,7 +209,8 @@ def _type_with_key(line: ErrorDetails, location: Location, data: Any) -> str:
     if line["type"] == "unknown_key" and not parents:
         entries = {name: data.get(name) for name in data if isinstance(data[name], Mapping)}
         sections = {**entries, "simulation": SimulationSettings.model_fields}
-        section = next((name for name, keys in sections.items() if key in keys and name != key), "")
+        fitting = (name for name, keys in sections.items() if key in keys and name != key)
+        section = next(fitting, "")
         return f". Write {section}.{key}" if section else ""
     kind = kind_at(Scenario, parents)
     if line["type"] != "unknown_key" or kind is None:

@@ -76,10 +76,8 @@ def schema() -> dict[str, Any]:
             definition.update(title=name, properties=properties)
         forms = [{"$ref": f"#/$defs/{name}", "required": ["type"]} for name in types.values()]
         definitions[kind] = {"anyOf": [*forms, *_forms_without_fields(kind, types)]}
-    definitions = {
-        key: _without_required(_expand(value, definitions, kinds))
-        for key, value in definitions.items()
-    }
+    expanded = {key: _expand(value, definitions, kinds) for key, value in definitions.items()}
+    definitions = {key: _without_required(value) for key, value in expanded.items()}
     result = definitions.pop("Scenario")
     _allow_composition(result["properties"])
     dialect = "https://json-schema.org/draft/2020-12/schema"
@@ -291,7 +289,7 @@ def _without_required(value: Any) -> Any:
         return [_without_required(item) for item in value]
     if not isinstance(value, dict):
         return value
-    result = {k: _without_required(v) for k, v in value.items() if k != "required"}
+    result = {key: _without_required(inner) for key, inner in value.items() if key != "required"}
     if "type" in value.get("required", ()):
         result["required"] = ["type"]
     return result

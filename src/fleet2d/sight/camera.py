@@ -450,6 +450,12 @@ class Disturbance:
         return self.camera in (None, camera)
 
 
+def dark_cameras(names: Iterable[str], disturbances: Iterable[Disturbance]) -> set[str]:
+    """Return those of some cameras that see nothing at all because of disturbances."""
+    darkness = [disturbance for disturbance in disturbances if disturbance.dark]
+    return {name for name in names if any(each.is_of(name) for each in darkness)}
+
+
 class SightSettings(Settings):
     """How a run computes what is in view.
 
