@@ -3,8 +3,11 @@
 import json
 
 import pandas as pd
+import pytest
 from tests.live.exporters.worlds import NAMES, day, part, poses, rows
 
+import fleet2d
+from fleet2d.errors import RunDirectoryError
 from fleet2d.live.exporters.texts import export_csv, export_jsonl
 
 
@@ -21,6 +24,12 @@ def test_csv_has_the_pose_of_each_body_at_each_time(tmp_path):
     assert {"ana", "ben"} == set(away["entity"])
     assert away[["x", "y", "room"]].isna().all(axis=None)
     assert pd.Timestamp("2026-01-05 06:00") == table["time"].min()
+
+
+def test_a_run_without_bodies_has_no_poses_to_write(tmp_path):
+    empty = fleet2d.run({"simulation": {"duration": "1 min"}, "floorplan": "bundled"})
+    with pytest.raises(RunDirectoryError, match="neither users nor robots"):
+        export_csv(empty, tmp_path / "day.csv", part())
 
 
 def test_json_lines_have_all_records_in_order_of_time(tmp_path):

@@ -30,11 +30,16 @@ def export_csv(run: Run, path: Path, part: Selection) -> str:
         A line with the number of rows.
 
     Raises:
-        RunDirectoryError: The file can't be written.
+        RunDirectoryError: The run has no bodies, or the file can't be written.
     """
     import pyarrow as pa
     from pyarrow import csv
 
+    if not any(run.manifest["entities"].values()):
+        raise RunDirectoryError(
+            "the run has neither users nor robots, so there are no poses: its events are in a file"
+            " .jsonl"
+        )
     rooms = pa.array([room.name for room in run.plan.rooms])
     count = 0
     with new_file(path) as file:
