@@ -117,6 +117,13 @@ def test_hands_are_washed_right_after_the_toilet_as_often_as_stated():
     assert 0.8 == pytest.approx(washed, abs=0.03)
 
 
+def test_a_need_waits_for_the_end_of_what_is_not_interruptible():
+    shower = {"at": "12:00", "spread": "0 s", "takes": "20 min"}
+    day = {**IDLE["days"]["any_day"], "do": {"shower": shower}}
+    for one in days(of({"drink": "20 min"}, days={"any_day": day})):
+        assert 1 == sum(episode.task == "shower" for episode in one)
+
+
 def test_calls_come_only_at_their_times_of_day():
     call = {"every": {"law": "exponential", "mean": "1 h"}, "between": ["10:00", "12:00"]}
     lived = of({"phone_call": {**call, "patience": "0 s"}})
