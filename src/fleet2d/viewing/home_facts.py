@@ -15,10 +15,10 @@ from fleet2d.configuration.problems import validating
 from fleet2d.entities.home_object import Door
 from fleet2d.errors import ArtifactError, Fleet2DError
 from fleet2d.floorplan.home import Home
-from fleet2d.floorplan.lattice import UNITS_PER_CELL
+from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
 from fleet2d.floorplan.placed_objects import PlacedObject, move_object
 from fleet2d.floorplan.plan import FloorPlan, Room
-from fleet2d.kernels import I16, Mesh
+from fleet2d.kernels import F64, I16, Mesh
 from fleet2d.palette import deep_color, room_color
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
@@ -49,23 +49,18 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
     """
     lattice = plan.lattice
     symbols: dict[tuple[str, float, float], int] = {}
-    origin = np.rint(np.asarray(lattice.origin) / lattice.cell).astype(int) * UNITS_PER_CELL
+    origin_cell = np.rint(np.asarray(lattice.origin) / lattice.cell).astype(int)
+    left, bottom = (origin_cell * UNITS_PER_CELL).tolist()
     return HomeFacts(
         name=plan.name,
         cell=lattice.cell,
-        origin_units=(int(origin[0]), int(origin[1])),
+        origin_units=(left, bottom),
         units_per_m=lattice.units_per_m,
         columns=lattice.columns,
         rows=lattice.rows,
         bounds=plan.bounds,
         area_m2=plan.area_m2,
-        free=[
-            [
-                points(lattice.to_metres(shapely.get_coordinates(ring)[:-1]))
-                for ring in shapely.get_rings(part)
-            ]
-            for part in plan.polygons
-        ],
+        free=[_outlines(part, lattice) for part in plan.polygons],
         rooms=list(_rooms_facts(plan.rooms)),
         room_cells=runs_of(plan.room_of_cell),
         place_cells=runs_of(plan.room_of_place),
@@ -73,9 +68,19 @@ def home_facts(plan: FloorPlan, doors: Sequence[DoorFacts] = ()) -> HomeFacts:
         doors=list(doors),
         objects=[object_facts(item, symbols) for item in (*plan.objects, *_panes(plan))],
         symbols=[symbol_of(*key) for key in symbols],
-        no_go=[points(shapely.get_coordinates(area.exterior)[:-1]) for area in plan.no_go],
+        no_go=[points(_corners(area.exterior)) for area in plan.no_go],
         entrance=plan.entrance,
     )
+
+
+def _outlines(part: shapely.Polygon, lattice: Lattice) -> list[list[Point]]:
+    """Return the outlines of a part of the free space and of its holes [m]."""
+    return [points(lattice.to_metres(_corners(ring))) for ring in shapely.get_rings(part)]
+
+
+def _corners(ring: shapely.LinearRing) -> F64:
+    """Return the corners of a ring, each once: float64 (n, 2)."""
+    return shapely.get_coordinates(ring)[:-1]
 
 
 def _panes(plan: FloorPlan) -> list[PlacedObject]:
@@ -91,7 +96,6 @@ def object_facts(item: PlacedObject, symbols: dict[tuple[str, float, float], int
         item: The piece.
         symbols: The numbers of symbols by type and size [m], which grow.
     """
-    outline = shapely.get_coordinates(item.footprint.exterior)[:-1]
     place = placed_symbol(item)
     symbol = -1
     if place.is_box:
@@ -100,7 +104,7 @@ def object_facts(item: PlacedObject, symbols: dict[tuple[str, float, float], int
     return ObjectFacts(
         name=item.name,
         type=item.type,
-        outline=points(outline),
+        outline=points(_corners(item.footprint.exterior)),
         middle=place.middle,
         symbol=symbol,
         blocks=item.blocks,
@@ -117,12 +121,16 @@ class SymbolPlace(NamedTuple):
         wide: Its extent from left to right.
         deep: Its extent from back to front.
         is_box: Whether it is a box along its front, which its symbol fills.
+        right: The direction to its right, float64 (2,).
+        forward: The direction of its front, float64 (2,).
     """
 
     middle: Point
     wide: float
     deep: float
     is_box: bool
+    right: F64
+    forward: F64
 
 
 def placed_symbol(item: PlacedObject) -> SymbolPlace:
@@ -138,7 +146,7 @@ def placed_symbol(item: PlacedObject) -> SymbolPlace:
     middle = (across.min() + wide / 2) * right + (along.min() + deep / 2) * forward
     is_box = item.footprint.area > BOX_SHARE * wide * deep
     x, y = np.round(middle, DIGITS).tolist()
-    return SymbolPlace((x, y), wide, deep, is_box)
+    return SymbolPlace((x, y), wide, deep, is_box, right, forward)
 
 
 def front_of(item: PlacedObject) -> float:

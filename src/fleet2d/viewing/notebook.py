@@ -43,11 +43,11 @@ def _draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
     from fleet2d.viewing.pictures.run import run_figure
 
     last = run.manifest["steps"] - 1
-    step = last if at is None else at if isinstance(at, int) else step_of(at, run.clock, "at")
+    step = step_of(at, run.clock, "at") if isinstance(at, str) else at
     if axes is not None:
-        moment_on_axes(run, min(step, last), axes)
+        moment_on_axes(run, last if step is None else min(step, last), axes)
         return axes
-    return run_figure(run) if at is None else moment_figure(run, step)
+    return run_figure(run) if step is None else moment_figure(run, step)
 
 
 def _draw_plan(plan: FloorPlan, axes: Any) -> Any:

@@ -7,7 +7,9 @@ that a camera saw are the same.
 """
 
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Iterator
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,9 +24,7 @@ USED_WITHIN_M = 0.16
 """Somebody who is farther from a place to use furniture than this doesn't use it."""
 
 KEY_FRAMES = "key_frames"
-
-
-NAMES = ("step", "time_us", "end_us", "user", "posture", "object", "x", "y", "heading")
+NOBODY = np.zeros(0, np.int64)
 
 
 class PersonStays(NamedTuple):
@@ -60,24 +60,26 @@ def postures_of(run: Run, plan: FloorPlan) -> Any:
     rests = [
         (item.name, use) for item in plan.objects for use in item.uses if use.posture != "stand"
     ]
-    places = np.array([(use.x, use.y) for _, use in rests]).reshape(-1, 2)
+    poses = np.array([(use.x, use.y, use.heading) for _, use in rests]).reshape(-1, 3)
+    stays = [(NOBODY, NOBODY, NOBODY, NOBODY)]
+    if rests:
+        stays += [_rests_of(stay, poses[:, :2]) for stay in _stays(run)]
+    user, rest, begin_us, end_us = map(np.concatenate, zip(*stays, strict=True))
     users = run.manifest["entities"]["users"]
-    stays = [_rests_of(stay, places) for stay in _stays(run)] if rests else []
-    user, use, begin_us, end_us = (
-        np.concatenate([np.zeros(0, np.int64), *(stay[i] for stay in stays)]) for i in range(4)
-    )
-    names, uses = zip(*rests, strict=True) if rests else ((), ())
-    poses = np.array([(use.x, use.y, use.heading) for use in uses]).reshape(-1, 3)[use].T
-    arrays = [
-        number_array(-(-begin_us // run.manifest["step_us"]), pa.int64()),
-        number_array(begin_us, pa.int64()),
-        number_array(end_us, pa.int64()),
-        string_array([users[number] for number in user.tolist()]),
-        string_array([uses[number].posture for number in use.tolist()]),
-        string_array([names[number] for number in use.tolist()]),
-        *(number_array(values, pa.float64()) for values in poses),
-    ]
-    return pa.table(arrays, names=NAMES)
+    used = [rests[number] for number in rest.tolist()]
+    x, y, heading = poses[rest].T
+    columns = {
+        "step": number_array(-(-begin_us // run.manifest["step_us"]), pa.int64()),
+        "time_us": number_array(begin_us, pa.int64()),
+        "end_us": number_array(end_us, pa.int64()),
+        "user": string_array([users[number] for number in user.tolist()]),
+        "posture": string_array([use.posture for _, use in used]),
+        "object": string_array([name for name, _ in used]),
+        "x": number_array(x, pa.float64()),
+        "y": number_array(y, pa.float64()),
+        "heading": number_array(heading, pa.float64()),
+    }
+    return pa.table(columns)
 
 
 class Postures:
@@ -89,17 +91,16 @@ class Postures:
         Raises:
             ArtifactError: The key frames are damaged.
         """
-        self._begins: dict[str, list[int]] = {}
-        self._rows: dict[str, list[dict[str, Any]]] = {}
+        self._rows: defaultdict[str, list[dict[str, Any]]] = defaultdict(list)
         for row in postures_of(run, plan).to_pylist():
-            self._begins.setdefault(row["user"], []).append(row["time_us"])
-            self._rows.setdefault(row["user"], []).append(row)
+            self._rows[row["user"]].append(row)
 
     def at(self, user: str, time_us: int) -> dict[str, Any] | None:
         """Return the row of a user at a time [us since the start]; None: the user stands."""
-        number = bisect_right(self._begins.get(user, []), time_us) - 1
-        row = self._rows[user][number] if number >= 0 else None
-        return row if row is not None and time_us < row["end_us"] else None
+        rows = self._rows[user]
+        begun = bisect_right(rows, time_us, key=itemgetter("time_us"))
+        is_used = begun > 0 and time_us < rows[begun - 1]["end_us"]
+        return rows[begun - 1] if is_used else None
 
 
 def posture_facts(run: Run, plan: FloorPlan) -> PostureFacts:
@@ -109,16 +110,16 @@ def posture_facts(run: Run, plan: FloorPlan) -> PostureFacts:
         ArtifactError: The key frames are damaged.
     """
     table = postures_of(run, plan)
-    columns = (table[name].to_pylist() for name in ("x", "y", "heading", "posture"))
-    keys = list(zip(*columns, strict=True))
-    numbers = {key: number for number, key in enumerate(dict.fromkeys(keys))}
+    columns = [table[name].to_pylist() for name in ("x", "y", "heading", "posture")]
+    poses = list(zip(*columns, strict=True))
+    different = list(dict.fromkeys(poses))
     return PostureFacts(
         uses=[
             UseFacts(x=x, y=y, heading=heading, posture=posture)
-            for x, y, heading, posture in numbers
+            for x, y, heading, posture in different
         ],
         user=table["user"].to_pylist(),
-        use=[numbers[key] for key in keys],
+        use=[different.index(pose) for pose in poses],
         from_us=table["time_us"].to_pylist(),
         to_us=table["end_us"].to_pylist(),
     )
@@ -134,26 +135,23 @@ def _stays(run: Run) -> Iterator[PersonStays]:
     entity, names = categories(table["entity"])
     kind, kinds = categories(table["kind"])
     planned = kinds.index("planned") if "planned" in kinds else len(kinds)
-    start = run.clock.stamp(0).astype(np.int64)
     step_us = run.manifest["step_us"]
-    columns = (values_of(table[name]) for name in ("time", "step", "x", "y", "away"))
-    time, step, x, y, away = columns
+    keys = _Keys(
+        time_us=values_of(table["time"]) - run.clock.stamp(0).astype(np.int64),
+        holds_us=values_of(table["step"]) * step_us,
+        is_last=kind == planned,
+        places=np.stack([values_of(table["x"]), values_of(table["y"])], axis=-1),
+        away=values_of(table["away"]),
+    )
     for user, name in enumerate(run.manifest["entities"]["users"]):
-        if name not in names:
-            continue
-        rows = np.flatnonzero(entity == names.index(name))
-        keys = _Keys(
-            time_us=time[rows] - start,
-            holds_us=step[rows] * step_us,
-            is_last=kind[rows] == planned,
-            places=np.stack([x[rows], y[rows]], axis=-1),
-            away=away[rows],
-        )
-        yield _stays_of(user, keys, run.manifest["steps"] * step_us)
+        if name in names:
+            rows = np.flatnonzero(entity == names.index(name))
+            keys_of_user = _Keys._make(column[rows] for column in keys)
+            yield _stays_of(user, keys_of_user, run.manifest["steps"] * step_us)
 
 
 class _Keys(NamedTuple):
-    """Key frames of a body: when each is reached, and from when on it holds [us since the start].
+    """Key frames: when each is reached, and from when on it holds [us since the start].
 
     `is_last` says which are the ends of movements that were interrupted: the next piece of key
     frames begins after them.
@@ -182,13 +180,14 @@ def _stays_of(user: int, keys: _Keys, end_us: int) -> PersonStays:
 
 def _rests_of(stays: PersonStays, rests: F64) -> tuple[I64, I64, I64, I64]:
     """Return user, place to rest, begin and end of a user's stays where one sits or lies."""
-    far = np.hypot(*(stays.places[:, None] - rests).transpose(2, 0, 1))
-    use = far.argmin(axis=1)
-    near = far.min(axis=1) < USED_WITHIN_M
-    use = use[near]
-    begin = stays.begin_us[near]
-    end = stays.end_us[near]
+    across, up = (stays.places[:, None] - rests).transpose(2, 0, 1)
+    distance = np.hypot(across, up)
+    is_near = distance.min(axis=1) < USED_WITHIN_M
+    use = distance.argmin(axis=1)[is_near]
+    begin = stays.begin_us[is_near]
+    end = stays.end_us[is_near]
     # Who turns around on furniture stays on it.
-    begins = np.append(True, (begin[1:] != end[:-1]) | (use[1:] != use[:-1]))[: len(use)]
-    ends = np.append(begins[1:], True)[: len(use)]
+    leaves = (begin[1:] != end[:-1]) | (use[1:] != use[:-1])
+    begins = np.append(True, leaves)[: len(use)]
+    ends = np.append(leaves, True)[: len(use)]
     return np.full(np.count_nonzero(begins), stays.user), use[begins], begin[begins], end[ends]

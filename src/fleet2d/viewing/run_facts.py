@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime, time, timedelta
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,6 +33,7 @@ from fleet2d.viewing.contract import (
     BodyFacts,
     CameraFacts,
     ColumnFacts,
+    HomeFacts,
     MarkFacts,
     RunFacts,
     SightingFacts,
@@ -101,7 +103,8 @@ def slow_floors(
 ) -> list[SlowFacts]:
     """Return the floors that slow robots down, of a scenario and of records of interventions."""
     areas = scenario["floorplan"].get("slows", ())
-    return slow_floors_of([*({"do": "slow", "step": 0, **a} for a in areas), *records], clock)
+    from_start = [{"do": "slow", "step": 0, **area} for area in areas]
+    return slow_floors_of([*from_start, *records], clock)
 
 
 def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[SlowFacts]:
@@ -116,11 +119,19 @@ def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[S
         if duration is not None:
             end = min(end, step + clock.step_at_or_after(micros(parse_duration(duration))))
         area = SlowArea(**{key: record[key] for key in SlowArea.model_fields if key in record})
-        parts = [f"robots drive at {area.speed:.0%}"] if area.speed < 1 else []
-        parts += [f"robots stop for {area.stop.total_seconds():g} s"] if area.stop else []
-        words = ", ".join(parts)
-        floors.append(SlowFacts(outline=list(area.area), words=words, step=step, end=end))
+        facts = SlowFacts(outline=list(area.area), words=_slow_words(area), step=step, end=end)
+        floors.append(facts)
     return floors
+
+
+def _slow_words(area: SlowArea) -> str:
+    """Return what robots do on a floor that slows them down."""
+    parts = []
+    if area.speed < 1:
+        parts.append(f"robots drive at {area.speed:.0%}")
+    if area.stop:
+        parts.append(f"robots stop for {area.stop.total_seconds():g} s")
+    return ", ".join(parts)
 
 
 def starts_unlit(scenario: Mapping[str, Any]) -> bool:
@@ -192,14 +203,16 @@ def sightings_of(run: Run) -> list[SightingFacts]:
         users |= dict.fromkeys(user_names)
         step = values_of(batch["step"])
         false = _are_false(batch)
-        names = [*user_names, ""]
-        lane = robot * len(names) + user % len(names)  # the last one is of an unknown user
-        for code in np.unique(lane).tolist():
-            key = robot_names[code // len(names)], names[code % len(names)]
-            none = SightingFacts(robot=key[0], user=key[1], first=[], last=[], false=[])
-            _extend(lanes.setdefault(key, none), step[lane == code], false[lane == code], gap)
-    order = [(robot, user) for robot in robots for user in (*users, "")]
-    return [lanes[key] for key in order if key in lanes]
+        names = [*user_names, ""]  # the last one is of an unknown user
+        for number, robot_name in enumerate(robot_names):
+            for known, name in enumerate(names):
+                rows = (robot == number) & (user % len(names) == known)
+                if rows.any():
+                    none = SightingFacts(robot=robot_name, user=name, first=[], last=[], false=[])
+                    lane = lanes.setdefault((robot_name, name), none)
+                    _extend(lane, step[rows], false[rows], gap)
+    pairs = product(robots, (*users, ""))
+    return [lanes[pair] for pair in pairs if pair in lanes]
 
 
 def _observations(run: Run) -> Iterator[Any]:
@@ -239,14 +252,11 @@ def _extend(lane: SightingFacts, step: I64, false: Bool, gap: int) -> None:
     step = step[order]
     false = false[order]
     cuts = (np.diff(step) > gap) | (false[1:] != false[:-1])
-    begins = np.append(0, np.flatnonzero(cuts) + 1)
-    ends = np.append(begins[1:] - 1, len(step) - 1)
-    first, last, is_false = (each.tolist() for each in (step[begins], step[ends], false[begins]))
+    first = step[np.append(True, cuts)].tolist()
+    last = step[np.append(cuts, True)].tolist()
+    is_false = false[np.append(True, cuts)].tolist()
     if lane["last"] and first[0] - lane["last"][-1] <= gap and is_false[0] == lane["false"][-1]:
-        lane["last"][-1] = last[0]
-        first = first[1:]
-        last = last[1:]
-        is_false = is_false[1:]
+        del lane["last"][-1], first[0], is_false[0]
     lane["first"] += first
     lane["last"] += last
     lane["false"] += is_false
@@ -264,34 +274,58 @@ def run_facts(run: Run, walls: WallsHistory) -> RunFacts:
     manifest = run.manifest
     scenario = manifest["scenario"]
     verdicts = verdicts_of(run)
+    facts = _first_facts(run_title(run), scenario, run.clock, home_facts(run.plan, walls.doors))
+    facts.update(
+        {
+            "status": run.status,
+            "notes": list(run.notes),
+            "seed": manifest["seed"],
+            "digest": run.digest,
+            "bodies": bodies_of(scenario, manifest["entities"]),
+            "tables": [_table_facts(run, name) for name in run.tables],
+            "walls": walls.changes,
+            "marks": marks_of(run),
+            "verdict": verdict_line(run, verdicts),
+            "verdicts": [
+                VerdictFacts(name=v.name, outcome=v.outcome, says=v.says, step=v.step)
+                for v in verdicts
+            ],
+            "story": story_of(run),
+            "slows": slow_floors(scenario, manifest.get("interventions") or (), run.clock),
+            "metrics": as_json(run.metrics),
+        }
+    )
+    return facts
+
+
+def _first_facts(title: str, scenario: dict[str, Any], clock: Clock, home: HomeFacts) -> RunFacts:
+    """Return the facts of a run that has just started: nothing has happened yet."""
     return RunFacts(
-        title=run_title(run),
-        status=run.status,
-        notes=list(run.notes),
-        start=(EPOCH + timedelta(microseconds=stamp_us(run.clock.start))).isoformat(),
-        offsets=offsets_of(run.clock),
-        step_us=manifest["step_us"],
-        steps=manifest["steps"],
+        title=title,
+        status="running",
+        notes=[],
+        start=(EPOCH + timedelta(microseconds=stamp_us(clock.start))).isoformat(),
+        offsets=offsets_of(clock),
+        step_us=clock.step_us,
+        steps=clock.steps,
         first_step=0,
-        end_step=manifest["steps"],
-        seed=manifest["seed"],
-        digest=run.digest,
+        end_step=clock.steps,
+        seed=None,
+        digest=None,
         version=__version__,
-        home=home_facts(run.plan, walls.doors),
-        bodies=bodies_of(scenario, manifest["entities"]),
-        tables=[_table_facts(run, name) for name in run.tables],
-        walls=walls.changes,
-        marks=marks_of(run),
-        verdict=verdict_line(run, verdicts),
-        verdicts=[
-            VerdictFacts(name=v.name, outcome=v.outcome, says=v.says, step=v.step) for v in verdicts
-        ],
-        story=story_of(run),
-        slows=slow_floors(scenario, manifest.get("interventions") or (), run.clock),
-        skies=skies_of(scenario, run.clock),
+        home=home,
+        bodies=[],
+        tables=[],
+        walls=[WallsChange(step=0, walls=0)],
+        marks=[],
+        verdict="",
+        verdicts=[],
+        story=[],
+        slows=[],
+        skies=skies_of(scenario, clock),
         starts_unlit=starts_unlit(scenario),
         event_kinds=sorted(EventKind),
-        metrics=as_json(run.metrics),
+        metrics={},
         scenario=scenario,
         walks_every_s=0.0,
     )
@@ -450,32 +484,9 @@ def live_facts(simulation: Simulation) -> RunFacts:
         for behavior in simulation.actors[body["name"]].behaviors:
             keys = behavior.model_dump(mode="json")
             body["keys"].setdefault(behavior.type_name, keys)
-    return RunFacts(
-        title=simulation.scenario.name or "live run",
-        status="running",
-        notes=[],
-        start=(EPOCH + timedelta(microseconds=stamp_us(clock.start))).isoformat(),
-        offsets=offsets_of(clock),
-        step_us=clock.step_us,
-        steps=clock.steps,
-        first_step=0,
-        end_step=clock.steps,
-        seed=simulation.seed,
-        digest=None,
-        version=__version__,
-        home=home_facts(plan, doors),
-        bodies=bodies,
-        tables=[],
-        walls=[WallsChange(step=0, walls=0)],
-        marks=[],
-        verdict="",
-        verdicts=[],
-        story=[],
-        slows=slow_floors(scenario, interventions_of(simulation), clock),
-        skies=skies_of(scenario, clock),
-        starts_unlit=starts_unlit(scenario),
-        event_kinds=sorted(EventKind),
-        metrics={},
-        scenario=scenario,
-        walks_every_s=0.0,
-    )
+    title = simulation.scenario.name or "live run"
+    facts = _first_facts(title, scenario, clock, home_facts(plan, doors))
+    facts["seed"] = simulation.seed
+    facts["bodies"] = bodies
+    facts["slows"] = slow_floors(scenario, interventions_of(simulation), clock)
+    return facts

@@ -1,13 +1,12 @@
 """A home with everyone in it at a step of a run, and a strip of time with a row for each body."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, NamedTuple
 
 import matplotlib.dates as mdates
 import numpy as np
-import shapely
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection, PolyCollection
@@ -27,17 +26,24 @@ from fleet2d.runs.trajectory import Trajectory
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import EventKind
 from fleet2d.runtime.local_time import rules_of
-from fleet2d.viewing.contract import BodyFacts
+from fleet2d.viewing.contract import BodyFacts, CameraFacts
 from fleet2d.viewing.home_facts import WallsHistory
 from fleet2d.viewing.look import body_label, room_labels
 from fleet2d.viewing.night import Key, Light
-from fleet2d.viewing.pictures.floorplan import LETTER_WIDTH, floorplan_axes, points_per_m
+from fleet2d.viewing.pictures.floorplan import (
+    CENTERED,
+    LETTER_WIDTH,
+    directions,
+    floorplan_axes,
+    points_per_m,
+)
 from fleet2d.viewing.pictures.life import (
     HATCH_COLOR,
     QUIET_COLOR,
     RIM_COLOR,
     SightWalls,
     field_of_view,
+    outlines_of,
 )
 from fleet2d.viewing.postures import Postures
 from fleet2d.viewing.run_facts import bodies_of, sightings_of
@@ -74,10 +80,8 @@ def draw_strip(run: Run, plan: FloorPlan, bodies: Sequence[BodyFacts], axes: Axe
             boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
             if room >= 0 and stop - start > LABEL_PART * (end - begin):
-                name = labels[room]
-                style: dict[str, Any] = {"ha": "center", "va": "center", "color": TEXT_COLOR}
-                at = (start + stop) / 2
-                axes.text(at, number + 0.42, name, clip_on=True, fontsize=6.5, **style)
+                style = {**CENTERED, "color": TEXT_COLOR, "fontsize": 6.5, "clip_on": True}
+                axes.text((start + stop) / 2, number + 0.42, labels[room], **style)
     axes.add_collection(PolyCollection(boxes, facecolors=faces, lw=0, zorder=1), autolim=False)
     _mark_sightings(run, [body["name"] for body in bodies], axes)
     axes.set(xlim=(begin, end), ylim=(len(bodies), -0.05))
@@ -115,21 +119,18 @@ def _label(axes: Axes, bodies: Sequence[BodyFacts], clock: Clock) -> None:
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator, tz=zone))
     axes.xaxis.get_offset_text().set_visible(False)
-    axes.set_yticks(
-        np.arange(len(bodies)) + ROW_PART / 2, [body_label(body["name"]) for body in bodies]
-    )
+    names = [body_label(body["name"]) for body in bodies]
+    axes.set_yticks(np.arange(len(bodies)) + ROW_PART / 2, names)
     axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)
     for label, body in zip(axes.get_yticklabels(), bodies, strict=True):
         label.set(color=body["color"], fontweight="bold")
-    for side in axes.spines.values():
-        side.set_visible(False)
+    axes.spines[:].set_visible(False)
     axes.grid(axis="x", color=HATCH_COLOR, lw=0.4, zorder=0)
 
 
 TAIL = timedelta(minutes=1)  # length of the paths behind bodies
 MIN_RADIUS_M = 0.2
-TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-CIRCLE = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)  # of radius 1
+CIRCLE = directions(np.linspace(0, 2 * np.pi, 48, endpoint=False))  # of radius 1
 LYING = 2.6  # length of somebody who lies, as a share of the width
 NOSE = 1.6  # length of the line of the heading [radii]
 STRIP_ROWS = 6
@@ -193,7 +194,8 @@ def asked_of(run: Run) -> list[AskedTime]:
         if event in ENDS_TALK and robot in open_ones:
             asked.append(open_ones.pop(robot)._replace(end=step))
         elif event == EventKind.ASKS:
-            asked += [open_ones.pop(robot)] if robot in open_ones else []
+            if robot in open_ones:
+                asked.append(open_ones.pop(robot))
             open_ones[robot] = AskedTime(robot, detail, step, "no answer")
         elif event in SHOWN_AS and robot in open_ones and open_ones[robot].answered is None:
             open_ones[robot] = open_ones[robot]._replace(answer=SHOWN_AS[event], answered=step)
@@ -249,7 +251,8 @@ class Stage:
         Raises:
             ArtifactError: The run stored no key frames or no floor plan.
         """
-        self.stride, self._first = stride, first
+        self.stride = stride
+        self._first = first
         self._run = run
         self._plan = run.plan
         self._part = part_of_run(run, first, end)
@@ -399,16 +402,17 @@ class Stage:
         for talk in self._talks:
             if talk.robot == name and talk.step <= step <= self._end_of(talk):
                 is_answered = talk.answered is not None and talk.answered <= step
-                text = (
-                    f"{body_label(name)}: {talk.text}{f', {talk.answer}' if is_answered else '?'}"
-                )
+                answer = f", {talk.answer}" if is_answered else "?"
+                text = f"{body_label(name)}: {talk.text}{answer}"
         body.name.set_text(text)
         return text
 
     def _end_of(self, talk: AskedTime) -> int:
         """Return the last step at which a talk is shown, else a minute after its last word."""
+        if talk.end is not None:
+            return talk.end
         last = talk.step if talk.answered is None else talk.answered
-        return last + 60_000_000 // self._step_us if talk.end is None else talk.end
+        return last + 60_000_000 // self._step_us
 
     def _place(self, body: BodyArtists, index: int, step: int) -> tuple[float, float, float] | None:
         """Move the name of a body; return its pose, None while it is away."""
@@ -435,19 +439,28 @@ class Stage:
         """Write each name where it covers no body and no other name: above, else around it."""
         here = [body for body in self.bodies if body.name.get_visible()]
         taken = [*self._room_names]
-        taken += [(x - r, y - r, x + r, y + r) for (x, y), r in ((b.place, b.radius) for b in here)]
         for body in here:
             x, y = body.place
-            wide = BOLD_WIDTH * len(body.name.get_text()) * self._letter_m
-            tall = LINE_HEIGHT * self._letter_m
+            r = body.radius
+            taken.append((x - r, y - r, x + r, y + r))
+        tall = LINE_HEIGHT * self._letter_m
+        for body in here:
+            x, y = body.place
+            half_wide = BOLD_WIDTH * len(body.name.get_text()) * self._letter_m / 2
             off = 1.4 * body.radius
-            places = [(x, y + off), (x, y - off - tall), (x + off + wide / 2, y - tall / 2)]
-            places += [(x - off - wide / 2, y - tall / 2), (x, y + off + tall)]
-            boxes = [(px - wide / 2, py, px + wide / 2, py + tall) for px, py in places]
-            free = (k for k, box in enumerate(boxes) if not any(_meet(box, t) for t in taken))
-            at = next(free, 0)
-            body.name.set_position(places[at])
-            taken.append(boxes[at])
+            beside = off + half_wide
+            places = [
+                (x, y + off),
+                (x, y - off - tall),
+                (x + beside, y - tall / 2),
+                (x - beside, y - tall / 2),
+                (x, y + off + tall),
+            ]
+            boxes = [(px - half_wide, py, px + half_wide, py + tall) for px, py in places]
+            free = (number for number, box in enumerate(boxes) if _is_free(box, taken))
+            chosen = next(free, 0)
+            body.name.set_position(places[chosen])
+            taken.append(boxes[chosen])
 
     def _draw_bodies(self, poses: Sequence[tuple[float, float, float] | None]) -> None:
         """Draw bodies at their poses, and what they see; None for those who are away."""
@@ -455,7 +468,7 @@ class Stage:
         colors = [body.facts["color"] for body, _ in here] or "none"
         radius = np.array([body.radius for body, _ in here]).reshape(-1, 1, 1)
         place = np.array([pose for _, pose in here]).reshape(-1, 1, 3)
-        facing = np.stack([np.cos(place[..., 2]), np.sin(place[..., 2])], axis=2)
+        facing = directions(place[..., 2])
         centre = place[..., :2]
         self._noses.set(segments=np.append(centre, centre + NOSE * radius * facing, axis=1))
         self._noses.set_color(colors)
@@ -471,7 +484,7 @@ class Stage:
         """Set the regions that the cameras of a body see, if they changed."""
         number = int(np.searchsorted(self._change_steps, step, side="right")) - 1
         walls = self._walls.changes[max(0, number)]["walls"]
-        pans = self._pans(body.facts, step)
+        pans = tuple(self._pan(camera, step) for camera in body.facts["cameras"])
         key = (pose, walls, pans)
         if key == body.view_key:
             return
@@ -486,15 +499,15 @@ class Stage:
             angle_deg = float(np.rad2deg(camera["angle"]))
             lens = {"range": (camera["near"], camera["far"]), "angle_deg": angle_deg}
             region = field_of_view(sight, eye, heading + camera["heading"] + pan, lens)
-            body.views += [shapely.get_coordinates(part.exterior) for part in region.geoms]
+            body.views += outlines_of(region)
 
-    def _pans(self, facts: BodyFacts, step: int) -> tuple[float, ...]:
-        return tuple(
-            camera["pan"][step * self._step_us // camera["pan_us"] % len(camera["pan"])]
-            if camera["pan"]
-            else 0.0
-            for camera in facts["cameras"]
-        )
+    def _pan(self, camera: CameraFacts, step: int) -> float:
+        """Return how far a camera is turned from its middle [rad]."""
+        pans = camera["pan"]
+        if not pans:
+            return 0.0
+        turns = step * self._step_us // camera["pan_us"]
+        return pans[turns % len(pans)]
 
     def _draw_paths(self, index: int) -> list[F64]:
         """Draw the paths of the last minute; return them, each float64 (n, 2) [m]."""
@@ -517,8 +530,9 @@ class Stage:
         xy = {b.facts["name"]: (b.path.x[index], b.path.y[index]) for b in self.bodies}
         steps, robots, places = self._observed
         begin = step - self._first
-        rows = slice(*np.searchsorted(steps, [begin, begin + self.stride]).tolist())
-        seen = set(zip(robots[rows], map(tuple, places[rows].round(2).tolist()), strict=True))
+        first, end = np.searchsorted(steps, [begin, begin + self.stride]).tolist()
+        seen_at = map(tuple, places[first:end].round(2).tolist())
+        seen = set(zip(robots[first:end], seen_at, strict=True))
         lines = [[xy[robot], place] for robot, place in sorted(seen) if robot in xy]
         self._sightings.set_segments(lines)
         return lines
@@ -534,8 +548,13 @@ def _box_of(text: Text, point_m: float) -> Box:
     return x - half_wide, y - half_tall, x + half_wide, y + half_tall
 
 
-def _meet(one: Box, other: Box) -> bool:
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+def _is_free(box: Box, taken: Iterable[Box]) -> bool:
+    """Return whether a box meets no other one."""
+    left, bottom, right, top = box
+    return not any(
+        left < other_right and other_left < right and bottom < other_top and other_bottom < top
+        for other_left, other_bottom, other_right, other_top in taken
+    )
 
 
 def _observations(part: Run) -> tuple[I64, NDArray[Any], F64]:

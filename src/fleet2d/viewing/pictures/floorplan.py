@@ -46,7 +46,7 @@ from fleet2d.palette import (
 )
 from fleet2d.storage.files import write_atomically
 from fleet2d.viewing.contract import ShapeFacts
-from fleet2d.viewing.home_facts import front_of, placed_symbol
+from fleet2d.viewing.home_facts import placed_symbol
 from fleet2d.viewing.look import (
     JOINT_M,
     OUTLINE_EDGE,
@@ -66,6 +66,7 @@ LABEL_COLOR = "#6d737c"
 NO_GO_COLOR = "#c8452f"
 GLASS_COLOR = "#a9d5ea"
 
+CENTERED: dict[str, Any] = {"ha": "center", "va": "center"}
 LABEL_PT = (2.6, 5.0)
 # Width of a letter of the font, as a share of its size.
 LETTER_WIDTH = 0.62
@@ -85,11 +86,7 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
         zorder=1.6,
     )
     axes.add_collection(symbols, autolim=False)
-    # What is seen through, and not walked through, is drawn as glass in its walls.
-    panes = shapely.difference(list(plan.glass), shapely.MultiPolygon(plan.polygons))
-    parts = shapely.get_parts(shapely.transform(panes, plan.lattice.to_metres)).tolist()
-    glass = [part for part in parts if part.geom_type == "Polygon"]
-    _fill(glass, axes, facecolor=GLASS_COLOR, linewidths=0.5, zorder=1.7)
+    _draw_glass(plan, axes)
     no_go: dict[str, Any] = {"facecolor": "none", "edgecolor": NO_GO_COLOR, "hatch": "////"}
     _fill(plan.no_go, axes, **no_go, linewidths=0.5, zorder=1.75)
     _draw_doorways(plan, axes)
@@ -97,7 +94,19 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
         sign = {"stairs": "\N{UPWARDS ARROW FROM BAR}", "lift": "\N{UP DOWN ARROW}"}[portal.type]
         box = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": DOOR_COLOR, "lw": 0.6}
         for at in (portal.start, portal.end):
-            axes.text(*at, f"{sign}{number}", ha="center", va="center", size=5, bbox=box)
+            axes.text(*at, f"{sign}{number}", size=5, bbox=box, **CENTERED)
+
+
+def _draw_glass(plan: FloorPlan, axes: Axes) -> None:
+    """Draw what is seen through, and not walked through, as glass in its walls."""
+    panes = shapely.difference(list(plan.glass), shapely.MultiPolygon(plan.polygons))
+    glass = areas_of(shapely.transform(panes, plan.lattice.to_metres))
+    _fill(glass, axes, facecolor=GLASS_COLOR, linewidths=0.5, zorder=1.7)
+
+
+def areas_of(geometry: Any) -> list[shapely.Polygon]:
+    """Return the polygons among the parts of geometries, without lines and points."""
+    return [part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon"]
 
 
 def _fill(polygons: Iterable[shapely.Polygon], axes: Axes, **style: Any) -> None:
@@ -118,8 +127,8 @@ def label_objects(plan: FloorPlan, axes: Axes) -> None:
         if size < LABEL_PT[0] or item.type in drawn:
             continue
         middle = item.footprint.centroid
-        style: dict[str, Any] = {"ha": "center", "va": "center", "color": LABEL_COLOR}
-        axes.text(middle.x, middle.y, label, fontsize=size, rotation=rotation, zorder=4, **style)
+        style = {**CENTERED, "color": LABEL_COLOR, "rotation": rotation, "zorder": 4}
+        axes.text(middle.x, middle.y, label, fontsize=size, **style)
 
 
 def points_per_m(axes: Axes) -> float:
@@ -146,13 +155,10 @@ def _shapes(item: PlacedObject) -> list[tuple[F64, str | None, str | None]]:
     place = placed_symbol(item)
     if not place.is_box:
         return [(shapely.get_coordinates(item.footprint), OUTLINE_FILL, OUTLINE_EDGE)]
-    front = front_of(item)
-    forward = np.array([math.cos(front), math.sin(front)])
-    right = np.array([forward[1], -forward[0]])
     shapes = []
     for shape in symbol_of(item.type, place.wide, place.deep):
-        points = _corners(shape)
-        corners = place.middle + points[:, :1] * right + points[:, 1:] * forward
+        across, along = np.hsplit(_corners(shape), 2)
+        corners = place.middle + across * place.right + along * place.forward
         shapes.append((corners, shape["fill"], shape["edge"]))
     return shapes
 
@@ -160,27 +166,32 @@ def _shapes(item: PlacedObject) -> list[tuple[F64, str | None, str | None]]:
 def _corners(shape: ShapeFacts) -> F64:
     """Return the corners of a shape of a symbol [m]: float64 (n, 2)."""
     x0, y0, x1, y1 = shape["at"]
+    low = np.array([x0, y0])
+    high = np.array([x1, y1])
+    half = (high - low) / 2
     if shape["kind"] == "line":
-        return np.array([(x0, y0), (x1, y1)])
+        return np.stack([low, high])
     if shape["kind"] == "ellipse":
         turns = np.linspace(0, math.tau, CIRCLE, endpoint=False)
-        middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
-        radii = np.array([(x1 - x0) / 2, (y1 - y0) / 2])
-        return middle + np.stack([np.cos(turns), np.sin(turns)], axis=1) * radii
-    radius = min(shape["radius"], (x1 - x0) / 2, (y1 - y0) / 2)
+        return (low + high) / 2 + directions(turns) * half
+    radius = min(shape["radius"], *half.tolist())
     turns = np.linspace(0, math.pi / 2, ROUND)
-    parts = []
-    for quarter, (x, y) in enumerate(
-        (
-            (x1 - radius, y1 - radius),
-            (x0 + radius, y1 - radius),
-            (x0 + radius, y0 + radius),
-            (x1 - radius, y0 + radius),
-        )
-    ):
-        angle = turns + quarter * math.pi / 2
-        parts.append(np.array([x, y]) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
-    return np.concatenate(parts)
+    centres = (
+        (x1 - radius, y1 - radius),
+        (x0 + radius, y1 - radius),
+        (x0 + radius, y0 + radius),
+        (x1 - radius, y0 + radius),
+    )
+    corners = [
+        np.array(centre) + radius * directions(turns + quarter * math.pi / 2)
+        for quarter, centre in enumerate(centres)
+    ]
+    return np.concatenate(corners)
+
+
+def directions(angles: F64) -> F64:
+    """Return the unit vectors of angles [rad]: float64 (..., 2)."""
+    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
 def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
@@ -189,9 +200,8 @@ def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
     swings = []
     openings = []
     for door in plan.doorways:
-        start, end = np.array(door.start), np.array(door.end)
         if not door.leaf:
-            openings.append(np.stack([start, end]))
+            openings.append(np.array([door.start, door.end]))
             continue
         corners = _swing_of(door)
         swings.append(corners[1:])
@@ -204,11 +214,12 @@ def _draw_doorways(plan: FloorPlan, axes: Axes) -> None:
 
 def _swing_of(door: Doorway) -> F64:
     """Return the floor over which a door swings: its hinge, then the arc, float64 (n, 2) [m]."""
-    start, end = np.array(door.start), np.array(door.end)
-    across = end - start
+    hinge, end = np.array([door.start, door.end])
+    across = end - hinge
     left = np.array([-across[1], across[0]])
     angles = np.linspace(0, np.pi / 2, SWING)[:, None]
-    return np.concatenate([[start], start + across * np.cos(angles) + left * np.sin(angles)])
+    arc = hinge + across * np.cos(angles) + left * np.sin(angles)
+    return np.concatenate([[hinge], arc])
 
 
 # Formats of pictures, each with the metadata that would differ from time to time.
@@ -323,9 +334,11 @@ def _fonts() -> list[str]:
 def _letters_without_font(figure: Figure) -> str:
     """Return the letters of a figure's texts that none of the fonts has."""
     fonts = [get_font(findfont(name)) for name in _fonts()]
-    texts = {text.get_text() for text in figure.findobj(Text)}
-    letters = sorted(set("".join(texts)) - {"\n"})
-    return "".join(c for c in letters if not any(font.get_char_index(ord(c)) for font in fonts))
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    letters = set("".join(texts)) - {"\n"}
+    for font in fonts:
+        letters -= {letter for letter in letters if font.get_char_index(ord(letter))}
+    return "".join(sorted(letters))
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -432,8 +445,7 @@ def _draw_walls(plan: FloorPlan, axes: Axes) -> None:
     axes.add_patch(PathPatch(walls, facecolor=WALL_TOP, **style, zorder=0))
     right, down = SHADOW_M
     fallen = translate(shapely.difference(solid, free), right * units, -down * units)
-    parts = shapely.get_parts(shapely.intersection(fallen, free)).tolist()
-    shade = [part for part in parts if part.geom_type == "Polygon"]
+    shade = areas_of(shapely.intersection(fallen, free))
     if shade:
         shadow = _outline(plan, shade)
         axes.add_patch(PathPatch(shadow, facecolor=SHADOW_COLOR, edgecolor="none", zorder=1.68))
@@ -496,7 +508,9 @@ def _floor_colors(room: Room, x: F64, y: F64, *, patterned: bool) -> F64:
         paler = 0.45 * _noise(column, row)[:, None]
         colors += (1 - colors) * paler
         is_joint = (x % pitch < JOINT_M) | (y % pitch < JOINT_M)
-        colors[is_joint] = 0.86 * np.array(to_rgb(color)) + 0.14 * np.array(to_rgb(JOINT_COLOR))
+        tile = np.array(to_rgb(color))
+        joint = np.array(to_rgb(JOINT_COLOR))
+        colors[is_joint] = 0.86 * tile + 0.14 * joint
         return colors
     along, across = (x, y) if np.ptp(x) > np.ptp(y) else (y, x)
     row = across // pitch
@@ -519,7 +533,8 @@ def draw_cells(plan: FloorPlan, image: Any, axes: Axes, **style: Any) -> AxesIma
     """Draw an image that has a pixel for each cell of a plan on axes in metres."""
     lattice = plan.lattice
     left, bottom = lattice.origin
-    right, top = left + lattice.columns * lattice.cell, bottom + lattice.rows * lattice.cell
+    right = left + lattice.columns * lattice.cell
+    top = bottom + lattice.rows * lattice.cell
     return axes.imshow(image, extent=(left, right, bottom, top), origin="lower", **style)
 
 
@@ -530,14 +545,16 @@ def _draw_borders(plan: FloorPlan, axes: Axes) -> None:
     for flip, grid in ((False, rooms), (True, rooms.T)):
         low, high = grid[:-1], grid[1:]
         meets = (low != high) & (low != NO_ROOM) & (high != NO_ROOM)
-        line, first = np.nonzero(np.diff(np.pad(meets, ((0, 0), (1, 0))).astype(np.int8)) == 1)
-        _, end = np.nonzero(np.diff(np.pad(meets, ((0, 0), (0, 1))).astype(np.int8)) == -1)
-        runs = np.stack([np.stack([first, line + 1], 1), np.stack([end + 1, line + 1], 1)], 1)
+        changes = np.diff(meets.astype(np.int8), prepend=0, append=0)
+        line, first = np.nonzero(changes == 1)
+        _, end = np.nonzero(changes == -1)
+        starts = np.stack([first, line + 1], axis=1)
+        ends = np.stack([end, line + 1], axis=1)
+        runs = np.stack([starts, ends], axis=1)
         lines.append(runs[..., ::-1] if flip else runs)
     corners = plan.lattice.to_metres(np.concatenate(lines) * UNITS_PER_CELL)
-    color = BORDER_COLOR
-    dashes = (0, (4, 3))
-    axes.add_collection(LineCollection(list(corners), lw=0.6, color=color, ls=dashes, zorder=1.5))
+    style: dict[str, Any] = {"color": BORDER_COLOR, "ls": (0, (4, 3))}
+    axes.add_collection(LineCollection(list(corners), lw=0.6, zorder=1.5, **style))
 
 
 def _spread(room_of_cell: I16) -> I16:
@@ -562,13 +579,14 @@ def _draw_scale(plan: FloorPlan, axes: Axes) -> None:
     x0, y0, x1, _ = plan.bounds
     length = next((m for m in (50, 20, 10, 5, 2) if m <= (x1 - x0) / 3), 1)
     margin = _margin(plan)
-    bottom, height = y0 - 0.5 * margin, 0.05 * margin
-    for part, color in enumerate((TEXT_COLOR, "white")):
-        corner = (x0 + part * length / 2, bottom)
-        bar = Rectangle(corner, length / 2, height, facecolor=color, edgecolor=TEXT_COLOR, lw=0.8)
+    half = length / 2
+    bottom = y0 - 0.5 * margin
+    for left, color in ((x0, TEXT_COLOR), (x0 + half, "white")):
+        bar = Rectangle((left, bottom), half, 0.05 * margin, facecolor=color)
+        bar.set(edgecolor=TEXT_COLOR, linewidth=0.8)
         axes.add_patch(bar)
     style: dict[str, Any] = {"ha": "center", "va": "top", "color": TEXT_COLOR, "zorder": 5}
-    for metres, text in ((0.0, "0"), (length / 2, f"{length / 2:g}"), (length, f"{length} m")):
+    for metres, text in ((0.0, "0"), (half, f"{half:g}"), (length, f"{length} m")):
         axes.text(x0 + metres, y0 - scale_depth(plan), text, fontsize=8, **style)
 
 
@@ -584,8 +602,9 @@ def _empty_floor(plan: FloorPlan) -> I16:
     int16 (rows, columns).
     """
     empty = plan.room_of_cell.copy()
-    swings = [_swing_of(door) for door in plan.doorways if door.leaf]
-    for area in (*(item.footprint for item in plan.objects), *map(shapely.Polygon, swings)):
+    areas = [item.footprint for item in plan.objects]
+    areas += [shapely.Polygon(_swing_of(door)) for door in plan.doorways if door.leaf]
+    for area in areas:
         window, covered = grown_cells(plan.lattice, area, 0.0)
         empty[window][covered] = NO_ROOM
     return empty
@@ -606,12 +625,12 @@ def _write_room(plan: FloorPlan, room: Room, label: str, empty: I16, axes: Axes)
     name_and_area = f"{label}\n{room.area_m2:,.1f} m²"
     for text in (name_and_area, label.replace(" ", "\n", 1), label.rpartition(" ")[2]):
         lines = text.split("\n")
-        width, height = LETTER_WIDTH * max(map(len, lines)), 1.5 * len(lines)
-        size, rotation = _fit(space, width, height, MAX_FONT_PT)
+        width = LETTER_WIDTH * max(map(len, lines))
+        size, rotation = _fit(space, width, 1.5 * len(lines), MAX_FONT_PT)
         if size >= MIN_FONT_PT:
             x, y = plan.lattice.to_metres(plan.lattice.cell_centre(row, column)).tolist()
-            style: dict[str, Any] = {"ha": "center", "va": "center", "color": TEXT_COLOR}
-            axes.text(x, y, text, fontsize=size, rotation=rotation, zorder=5, **style)
+            style = {**CENTERED, "color": TEXT_COLOR, "rotation": rotation, "zorder": 5}
+            axes.text(x, y, text, fontsize=size, **style)
             return
 
 
@@ -621,8 +640,9 @@ def _middle(cells: Bool) -> tuple[int, int]:
     top, left = int(rows.min()), int(columns.min())
     window = cells[top : rows.max() + 1, left : columns.max() + 1]  # small in a large home
     depth = squared_distance(np.pad(window, 1))[rows - top + 1, columns - left + 1]
-    deep = np.flatnonzero(depth >= MIDDLE_DEPTH * depth.max())
-    rows, columns = rows[deep], columns[deep]
+    is_deep = depth >= MIDDLE_DEPTH * depth.max()
+    rows = rows[is_deep]
+    columns = columns[is_deep]
     distance = (rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2
     nearest = int(np.argmin(distance))
     return int(rows[nearest]), int(columns[nearest])
@@ -684,7 +704,7 @@ def _mark(axes: Axes, number: int, finding: Finding) -> None:
         axes.plot(line[:, 0], line[:, 1], color=color, lw=1.2, zorder=5.5)
     if finding.at is not None:
         box = {"boxstyle": "circle,pad=0.25", "facecolor": color, "edgecolor": "white", "lw": 0.8}
-        style: dict[str, Any] = {"ha": "center", "va": "center", "color": "white", "zorder": 6}
+        style = {**CENTERED, "color": "white", "zorder": 6}
         axes.text(*finding.at, str(number), fontsize=7, bbox=box, **style)
 
 

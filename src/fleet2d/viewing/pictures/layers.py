@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
-import shapely
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
@@ -24,7 +23,13 @@ from fleet2d.sight.cached_fov import Flashlight
 from fleet2d.sight.camera import DEFAULT_ANGLE_DEG, DEFAULT_RANGE_M
 from fleet2d.sight.fov import FieldOfView, VisibleRegion
 from fleet2d.viewing.pictures.floorplan import draw_cells, figure_size, floorplan_axes, picture
-from fleet2d.viewing.pictures.life import SightWalls, draw_region, draw_robot, field_of_view
+from fleet2d.viewing.pictures.life import (
+    SightWalls,
+    draw_region,
+    draw_robot,
+    field_of_view,
+    outlines_of,
+)
 
 # The brighter part of viridis: names of rooms are written over it.
 COLORS = ListedColormap(mpl.colormaps["viridis"](np.linspace(0.35, 1.0, 256)))
@@ -57,7 +62,8 @@ def draw_layer(run: Run, name: str, path: Path, step: int | None = None) -> None
         axes = figure.add_axes((0, 0, width / (width + beside), 1))
         floorplan_axes(plan, axes, title=False)
         colors = layer_on_axes(plan, values, axes)
-        _write_title(plan, f"{name}{f' [{unit}]' if unit else ''}, after step {step}", axes)
+        quantity = f"{name} [{unit}]" if unit else name
+        _write_title(plan, f"{quantity}, after step {step}", axes)
         if colors is not None:
             bar = figure.add_axes(((width + 0.1) / (width + beside), 0.12, 0.018, 0.76))
             figure.colorbar(colors, cax=bar).ax.tick_params(labelsize=8)
@@ -83,7 +89,8 @@ def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMa
         if values.dtype.kind == "i" and (values[has_value] >= -1).all():
             has_value &= values >= 0
         numbers = values[has_value].astype(np.float64)
-        low, high = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 1.0)
+        low = float(numbers.min()) if numbers.size else 0.0
+        high = float(numbers.max()) if numbers.size else 1.0
         colors = ScalarMappable(Normalize(low, high if high > low else low + 1.0), COLORS)
         image[has_value] = colors.to_rgba(numbers)
         image[has_value, 3] = SOLID
@@ -177,7 +184,7 @@ def region_panel(plan: FloorPlan, pose: CameraPose, axes: Axes, title: str) -> N
     camera = {"range": (0.0, pose.far), "angle_deg": pose.angle_deg}
     heading = float(np.deg2rad(pose.heading_deg))
     region = field_of_view(SightWalls.of(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
-    draw_region([shapely.get_coordinates(part.exterior) for part in region.geoms], axes)
+    draw_region(outlines_of(region), axes)
     _draw_robot(pose, axes)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
 from math import pi
+from operator import itemgetter
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from fleet2d.palette import TEXT_COLOR, VIEW_COLOR, VIEW_EDGE, body_color
 from fleet2d.runs.run import Run
 from fleet2d.runs.trajectory import rebuild_path
 from fleet2d.sight.fov import VisibleRegion, WallPlan
-from fleet2d.viewing.pictures.floorplan import draw_cells
+from fleet2d.viewing.pictures.floorplan import areas_of, directions, draw_cells
 
 CHIP_IN = 0.15
 LINE_IN = 0.215
@@ -66,7 +67,8 @@ class Overlay:
     def write(self, x: float, y: float, line: str, size: float, **style: Any) -> float:
         """Write a line of text, with its baseline at y; return the x of its end."""
         style = {"color": TEXT_COLOR, "va": "baseline", **style}
-        return x + self._width(self.axes.text(x, y, line, fontsize=size, **style))
+        text = self.axes.text(x, y, line, fontsize=size, **style)
+        return x + self._width(text)
 
     def _width(self, text: Text) -> float:
         """Return the width of a text [in]."""
@@ -135,9 +137,9 @@ class Overlay:
         if chip.kind in ("room", "seen"):
             axes.add_patch(Rectangle((x, low), side, side, facecolor=chip.color, lw=0))
         if chip.kind == "seen":
-            for bar, share in enumerate((0.2, 0.7, 0.45)):
-                corner = (x + (0.1 + 0.3 * bar) * side, low)
-                box = Rectangle(corner, 0.2 * side, share * side, facecolor=TEXT_COLOR, lw=0)
+            for left, height in ((0.1, 0.2), (0.4, 0.7), (0.7, 0.45)):
+                corner = (x + left * side, low)
+                box = Rectangle(corner, 0.2 * side, height * side, facecolor=TEXT_COLOR, lw=0)
                 axes.add_patch(box)
         if chip.kind in ("away", "area"):
             color = chip.color or HATCH_COLOR
@@ -261,12 +263,14 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
         minutes = max(1, round(int(moving[LEGS]) * step_us / 6e7))
         return legs[:LEGS], f"only the ways of the first {minutes} min are drawn"
     # The end of a leg that was interrupted is only planned, and left out.
-    keys = {name: column[keys["kind"] != "planned"] for name, column in keys.items()}
-    xy = np.stack([keys["x"], keys["y"]], axis=1)
-    ends = _are_ends(xy, np.stack([keys["heading"], keys["away"]], axis=1))
-    legs = _legs_between(xy[ends], keys["away"][ends])
+    is_real = keys["kind"] != "planned"
+    away = keys["away"][is_real]
+    xy = np.stack([keys["x"], keys["y"]], axis=1)[is_real]
+    ends = _are_ends(xy, np.stack([keys["heading"][is_real], away], axis=1))
+    legs = _legs_between(xy[ends], away[ends])
     # A patrol repeats the same paths for weeks: equal legs, to the centimetre, are drawn once.
-    _, first = np.unique(np.rint(legs.reshape(-1, 4) * 100), axis=0, return_index=True)
+    ends_cm = np.rint(legs.reshape(-1, 4) * 100)
+    _, first = np.unique(ends_cm, axis=0, return_index=True)
     return legs[np.sort(first)], ""
 
 
@@ -285,7 +289,9 @@ def _from_trajectories(
     xy = np.stack([rows["x"], rows["y"]], axis=1)
     index = {room.name: room.index for room in plan.rooms}
     room = np.array([index.get(word, -1) for word in rows["room"].tolist()], np.int16)
-    legs = _legs_between(xy, rows["away"])[:LEGS] if every_us <= MAX_LEG_GAP_US else NO_LEGS
+    legs = NO_LEGS
+    if every_us <= MAX_LEG_GAP_US:
+        legs = _legs_between(xy, rows["away"])[:LEGS]
     every = format_duration(timedelta(microseconds=every_us))
     note = f"{reason}: positions every {every}"
     return trace(every_us, rows["step"], xy, rows["heading"], room, legs, note)
@@ -296,19 +302,24 @@ def _rows(
 ) -> dict[str, NDArray[Any]]:
     """Return columns of the rows of a body; `category` is a column of texts."""
     content = run.tables[table]
-    code, names = categories(content["entity"])
-    of_body = code == names.index(name) if name in names else np.zeros(len(code), np.bool_)
+    of_body = texts_of(content["entity"]) == name
     rows = {column: content[column].to_numpy()[of_body] for column in columns}
-    code, names = categories(content[category])
-    rows[category] = np.array([*names, ""])[code[of_body]]
+    rows[category] = texts_of(content[category])[of_body]
     return rows
+
+
+def texts_of(column: Any) -> NDArray[np.str_]:
+    """Return the text of each row of a column of texts, empty where it is null."""
+    code, names = categories(column)
+    return np.array([*names, ""])[code]
 
 
 def _legs_between(xy: F64, away: Bool) -> F64:
     """Return the legs between positions, without those from and to an absence: (n, 2, 2) [m]."""
     legs = np.stack([xy[:-1], xy[1:]], axis=1)
+    moves = (xy[:-1] != xy[1:]).any(axis=1)
     home = ~away.astype(bool)
-    return legs[(legs[:, 0] != legs[:, 1]).any(axis=1) & home[:-1] & home[1:]]
+    return legs[moves & home[:-1] & home[1:]]
 
 
 def _are_ends(xy: F64, state: F64) -> Bool:
@@ -321,8 +332,9 @@ def _are_ends(xy: F64, state: F64) -> Bool:
     to = xy[1:-1] - xy[:-2]
     on = xy[2:] - xy[1:-1]
     way = xy[2:] - xy[:-2]
+    goes_on = (to * on).sum(axis=1) > 0
     beside = np.abs(to[:, 0] * way[:, 1] - to[:, 1] * way[:, 0])
-    is_straight = ((to * on).sum(axis=1) > 0) & (beside <= STRAIGHT_M * np.hypot(*way.T))
+    is_straight = goes_on & (beside <= STRAIGHT_M * np.hypot(*way.T))
     is_same = (state[1:] == state[:-1]).all(axis=1)
     ends = np.ones(len(xy), np.bool_)
     ends[1:-1] = ~(is_straight & is_same[1:] & is_same[:-1])
@@ -390,9 +402,10 @@ def draw_presence(plan: FloorPlan, trace: BodyTrace, axes: Axes) -> None:
 def samples_by_cell(lattice: Lattice, xy: F64) -> F64:
     """Return the number of positions, float64 (n, 2) [m], in each cell: float64 (rows, columns)."""
     column, row = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64).T
-    row, column = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
-    counts = np.bincount(row * lattice.columns + column, minlength=lattice.rows * lattice.columns)
-    return counts.reshape(lattice.rows, lattice.columns).astype(np.float64)
+    counts = np.zeros((lattice.rows, lattice.columns))
+    inside = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
+    np.add.at(counts, inside, 1)
+    return counts
 
 
 def opacity(time: F64, free: Bool) -> F64:
@@ -443,24 +456,28 @@ def draw_view(view: CameraView, radius: float, axes: Axes) -> None:
     """Draw the region that a camera sees, the robot, and lines to the users in view."""
     color = view.robot.color
     draw_region(view.outlines, axes)
-    for x, y in view.users.tolist():
-        axes.plot([view.xy[0], x], [view.xy[1], y], color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=4)
-        axes.plot(x, y, "o", ms=5, mfc="white", mec=color, mew=1.1, zorder=4.2)
+    for user in view.users:
+        line = np.stack([view.xy, user], axis=1)
+        axes.plot(*line, color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=4)
+        axes.plot(*user, "o", ms=5, mfc="white", mec=color, mew=1.1, zorder=4.2)
     draw_robot(view.xy, view.heading, max(radius, 0.13), color, axes)
 
 
 def draw_region(outlines: Sequence[F64], axes: Axes) -> None:
     """Draw a region that a camera sees, by the outlines of its parts [m]."""
     for outline in outlines:
-        axes.add_patch(Polygon(outline, facecolor=VIEW_COLOR, alpha=0.38, ec="none", zorder=2.2))
-        axes.add_patch(Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=0.7, zorder=3.2))
+        inside = Polygon(outline, facecolor=VIEW_COLOR, alpha=0.38, ec="none", zorder=2.2)
+        edge = Polygon(outline, fill=False, edgecolor=VIEW_EDGE, lw=0.7, zorder=3.2)
+        axes.add_patch(inside)
+        axes.add_patch(edge)
 
 
 def draw_robot(xy: F64, heading: float, radius: float, color: str, axes: Axes) -> None:
     """Draw a robot as a disc with a line to the front."""
-    x, y = xy.tolist()
-    axes.add_patch(Circle((x, y), radius, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3))
-    nose = [[x, x + radius * np.cos(heading)], [y, y + radius * np.sin(heading)]]
+    disc = Circle(xy.tolist(), radius, facecolor=color, edgecolor="white", lw=0.9, zorder=4.3)
+    axes.add_patch(disc)
+    front = xy + radius * directions(np.array(heading))
+    nose = np.stack([xy, front], axis=1)
     axes.plot(*nose, color="white", lw=1.1, zorder=4.4, solid_capstyle="butt")
 
 
@@ -484,12 +501,14 @@ def clear_names(plan: FloorPlan, views: Sequence[CameraView], axes: Axes) -> Non
         room = plan.room_at(x, y)
         if room is None or not len(marks):
             continue
-        for shift in (0.0, *(sign * 0.1 * k for k in range(1, 25) for sign in (-1, 1))):
+        shifts = [sign * 0.1 * k for k in range(1, 25) for sign in (-1, 1)]
+        for shift in (0.0, *shifts):
             ends = (y0 + shift, y1 + shift)
             is_inside = all(plan.room_at(at, end) is room for at in (x0, x, x1) for end in ends)
-            distance = (abs(marks - [(x0 + x1) / 2, sum(ends) / 2]) * 2).T
-            is_covered = (distance[0] < x1 - x0 + CLEAR_M) & (distance[1] < y1 - y0 + CLEAR_M)
-            if (is_inside or shift == 0) and not is_covered.any():
+            middle = [(x0 + x1) / 2, sum(ends) / 2]
+            distance = abs(marks - middle) * 2
+            is_covered = distance < (x1 - x0 + CLEAR_M, y1 - y0 + CLEAR_M)
+            if (is_inside or shift == 0) and not is_covered.all(axis=1).any():
                 text.set_position((x, y + shift))
                 break
 
@@ -525,9 +544,14 @@ def best_view(
         score = region.area * (1.0 if region.area < 0.97 * sector_area else 0.3)
         if len(users):
             score *= min(1.0, float(np.hypot(*(users - xy).T).max()) / FAR_APART_M)
-        parts = [shapely.get_coordinates(part.exterior) for part in region.geoms]
-        scored.append((score, CameraView(robot, step, xy, heading, parts, users)))
-    return max(scored, key=lambda each: each[0])[1] if scored else None
+        view = CameraView(robot, step, xy, heading, outlines_of(region), users)
+        scored.append((score, view))
+    return max(scored, key=itemgetter(0))[1] if scored else None
+
+
+def outlines_of(region: shapely.MultiPolygon) -> list[F64]:
+    """Return the outlines of the parts of a region, each float64 (n, 2)."""
+    return [shapely.get_coordinates(part.exterior) for part in region.geoms]
 
 
 def field_of_view(
@@ -539,17 +563,18 @@ def field_of_view(
     except PlacementError:
         return shapely.MultiPolygon()
     near, far = camera["range"]
-    half = np.deg2rad(camera["angle_deg"]) / 2
-    angles = np.linspace(heading - half, heading + half, max(3, round(half * 2 / pi * 180)))
-    arc = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    inner_arc = [xy] if near == 0 else (xy + near * arc[::-1]).tolist()
-    if camera["angle_deg"] >= 360:
-        sector = shapely.Point(xy).buffer(far).difference(shapely.Point(xy).buffer(near))
+    angle_deg = camera["angle_deg"]
+    if angle_deg >= 360:
+        eye = shapely.Point(xy)
+        sector = eye.buffer(far).difference(eye.buffer(near))
     else:
-        sector = shapely.Polygon([*(xy + far * arc).tolist(), *inner_arc])
+        half = np.deg2rad(angle_deg) / 2
+        angles = np.linspace(heading - half, heading + half, max(3, round(half * 2 / pi * 180)))
+        arc = directions(angles)
+        inner = [xy] if near == 0 else xy + near * arc[::-1]
+        sector = shapely.Polygon(np.concatenate([xy + far * arc, inner]))
     cut = shapely.intersection(shapely.make_valid(visible), shapely.make_valid(sector))
-    polygons = [p for p in shapely.get_parts(cut) if p.geom_type == "Polygon"]
-    return shapely.MultiPolygon(polygons)
+    return shapely.MultiPolygon(areas_of(cut))
 
 
 def blurred(image: F64, sigma: float) -> F64:

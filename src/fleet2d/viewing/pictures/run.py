@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from fleet2d.artifacts.table import categories
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64, I16, I64
 from fleet2d.palette import ACCENT_COLOR, TEXT_COLOR, deep_color
@@ -46,6 +45,7 @@ from fleet2d.viewing.pictures.life import (
     draw_sightings,
     draw_view,
     places_of,
+    texts_of,
     trace_of,
 )
 
@@ -110,7 +110,8 @@ def mark_boxes(marks: F64, lift: float = 0.0) -> F64:
         lift: The space between a mark and the end of the row [rows].
     """
     day, interval = np.nonzero(marks > 0)
-    left, right = interval * (24 / MARKS), (interval + 1) * (24 / MARKS)
+    left = interval * (24 / MARKS)
+    right = (interval + 1) * (24 / MARKS)
     bottom = day + 1 - lift
     top = bottom - MARK_PART * np.maximum(marks[day, interval], MIN_MARK_HEIGHT)
     corners = np.stack([left, top, right, top, right, bottom, left, bottom], axis=1)
@@ -149,7 +150,9 @@ def draw_actogram(
     axes.add_patch(Rectangle((0, 0), 24, days, lw=0, **style))
     extent = (0, 24, days, 0)
     axes.imshow(table[rooms], extent=extent, aspect="auto", interpolation="nearest", zorder=1)
-    gap = (1.1 if days <= 40 else 0.6) if days <= GAPS_UP_TO else 0.0  # points
+    gap = 1.1 if days <= 40 else 0.6  # points
+    if days > GAPS_UP_TO:
+        gap = 0.0
     row = axes.bbox.height / axes.figure.dpi * 72 / max(1, days)
     # Marks keep a distance to the lines between rows, which are snapped to whole pixels.
     lift = (gap / 2 + 0.25) / row if gap else 0.0
@@ -169,33 +172,33 @@ def _label(axes: Axes, start: datetime, days: int, *, dates: bool) -> None:
     if high - low <= 12:
         step = max(0.25, 2.0 ** np.ceil(np.log2((high - low) / 6)))
     ticks = np.arange(np.ceil(low / step) * step, high + 1e-9, step)
-    clock = (f"{int(tick)}:{round(tick % 1 * 60):02d}" for tick in ticks)
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks] if step >= 1 else list(clock))
+    hours = [f"{tick:g}" for tick in ticks]
+    if step < 1:
+        hours = [f"{int(tick)}:{round(tick % 1 * 60):02d}" for tick in ticks]
+    axes.set_xticks(ticks, hours)
     inner = ticks[(ticks > low) & (ticks < high)]
     axes.vlines(inner, 0, days, color="white", lw=0.5, alpha=0.6, zorder=2.5)
     axes.tick_params(length=0, labelsize=7.5, labelcolor=QUIET_COLOR, pad=3)
-    for side in axes.spines.values():
-        side.set_visible(False)
+    axes.spines[:].set_visible(False)
     rows, names = _dated_rows(start, days)
     axes.set_yticks(rows, names if dates else [""] * len(rows))
 
 
 def _dated_rows(start: datetime, days: int) -> tuple[list[float], list[str]]:
     """Return rows and their labels: each day, each Monday, or the first of each month."""
-    dates = [start.date() + timedelta(days=day) for day in range(days)]
-    if days <= 10:
-        labelled = list(range(days))
-    elif days <= GAPS_UP_TO:
-        labelled = [day for day in range(days) if dates[day].weekday() == 0]
-    else:
-        labelled = [day for day in range(days) if dates[day].day == 1]
-        labelled = labelled[:: 1 + len(labelled) // 24]
-    names = [f"{dates[day]:%a} {dates[day].day} {dates[day]:%b}" for day in labelled]
+    first = start.date()
+    dates = [first + timedelta(days=day) for day in range(days)]
     if days > GAPS_UP_TO:
-        has_year = [day == labelled[0] or dates[day].month == 1 for day in labelled]
-        forms = ["%b %Y" if each else "%b" for each in has_year]
-        names = [f"{dates[day]:{form}}" for day, form in zip(labelled, forms, strict=True)]
-    return [day + 0.5 for day in labelled], names
+        dates = [date for date in dates if date.day == 1]
+        dates = dates[:: 1 + len(dates) // 24]
+        names = [f"{date:%b}" if date.month > 1 else f"{date:%b %Y}" for date in dates]
+        if dates:
+            names[0] = f"{dates[0]:%b %Y}"
+    else:
+        if days > 10:
+            dates = [date for date in dates if date.weekday() == 0]
+        names = [f"{date:%a} {date.day} {date:%b}" for date in dates]
+    return [(date - first).days + 0.5 for date in dates], names
 
 
 MAX_BODIES = 4  # users with an actogram, and robots
@@ -270,7 +273,9 @@ class _Picture:
         self.run = run
         self.plan = run.plan
         clock = run.clock
-        self.start, self.step_us, self.steps = clock.start, clock.step_us, clock.steps
+        self.start = clock.start
+        self.step_us = clock.step_us
+        self.steps = clock.steps
         self.notes: list[str] = []
         self.users = self._traces("users", robot=False)
         self.robots = self._traces("robots", robot=True)
@@ -356,7 +361,8 @@ class _Picture:
         left, right, low, high = x0 - edge, x1 + edge, y0 - scale_depth(self.plan), y1 + edge
         self.right = ACTOGRAMS[len(self.panels)]
         beside = 2 * EDGE + self.right + (GAP if self.right else 0.0)
-        most, least = WIDTH - beside, MIN_LEFT_WIDTHS[len(self.panels) > 0]
+        most = WIDTH - beside
+        least = MIN_LEFT_WIDTHS[len(self.panels) > 0]
         # The text under the scale bar has the same size in inches in any home.
         scale = min(most / (right - left), (MAX_BODY_HEIGHT - SCALE_WORDS) / (high - low))  # in/m
         low -= SCALE_WORDS / scale
@@ -411,7 +417,8 @@ class _Picture:
             if robot.name in self.rings:
                 draw_sightings(self.rings[robot.name], robot.color, axes)
         for view in self.views:
-            draw_view(view, float(self._body("robots", view.robot.name).get("radius", 0.15)), axes)
+            radius = self._body("robots", view.robot.name).get("radius", 0.15)
+            draw_view(view, float(radius), axes)
         self.overlay.legend(EDGE, self.foot - 0.13, self.life_lines, SMALL)
 
     def _kept_out(self, robot: str) -> list[Any]:
@@ -462,7 +469,7 @@ class _Picture:
         share = self._number("sightings", trace.name)
         if share is not None and self.robots:
             facts.append(f"{_percent(share)} of that seen")
-        facts += [covers] if (covers := self._covers(trace.name)) else []
+        facts += filter(None, [self._covers(trace.name)])
         fit = self.overlay.fit
         while len(facts) > 1 and fit(SEPARATOR.join(facts), SMALL, width).endswith("…"):
             facts.pop()
@@ -499,15 +506,15 @@ def _observations(run: Run, users: list[str]) -> PlottedObservations:
     """Return the observations of some users."""
     if "observations" not in run.tables:
         none = np.zeros(0, np.int64)
-        return PlottedObservations(none, none.astype(str), none.astype(str), np.zeros((0, 2)))
+        nobody = np.zeros(0, str)
+        return PlottedObservations(none, nobody, nobody, np.zeros((0, 2)))
     table = run.tables["observations"]
-    robot, user = (
-        np.array([*names, ""])[code]
-        for code, names in map(categories, (table["robot"], table["user"]))
-    )
+    user = texts_of(table["user"])
     rows = np.isin(user, users)
     xy = np.stack([table["x"].to_numpy(), table["y"].to_numpy()], axis=1)
-    return PlottedObservations(table["step"].to_numpy()[rows], robot[rows], user[rows], xy[rows])
+    step = table["step"].to_numpy()
+    robot = texts_of(table["robot"])
+    return PlottedObservations(step[rows], robot[rows], user[rows], xy[rows])
 
 
 def _notes_by_bodies(traces: list[BodyTrace]) -> Iterator[str]:
@@ -523,8 +530,8 @@ def _date(time: datetime) -> str:
 
 def _length(us: int) -> str:
     for unit, size in (("day", DAY_US), ("hour", HOUR_US), ("minute", 60_000_000)):
-        if us >= size:
-            count = us / size
+        count = us / size
+        if count >= 1:
             return f"{count:.3g} {unit if count == 1 else unit + 's'}"
     return f"{us / 1e6:g} s"
 
