@@ -294,10 +294,15 @@ class StudyAnswers:
             )
         others = [column for column in self.columns if column != axis]
         of_reference = frame.filter(pl.col(axis) == reference)
-        for value in (value for value in values if value != reference):
+        for value in values:
+            if value == reference:
+                continue
             of_value = frame.filter(pl.col(axis) == value)
-            sides = (of_value, of_reference)
-            keys = [c for c in others if all(side[c].null_count() < len(side) for side in sides)]
+            keys = [
+                column
+                for column in others
+                if not (of_value[column].is_null().all() or of_reference[column].is_null().all())
+            ]
             pairs = of_value.select(*others, metric=metric).join(
                 of_reference.select(*keys, reference_metric=metric),
                 on=keys, how="inner", nulls_equal=True,

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
@@ -374,7 +375,7 @@ class ValuesAxis(Axis):
         paths = [key_path(key) for key in keys]
         labels = self.labels or label_values(self.values)
         return [
-            Choice({name: label}, tuple((path, value) for path in paths))
+            Choice({name: label}, tuple(product(paths, [value])))
             for label, value in zip(labels, self.values, strict=True)
         ]
 
@@ -396,10 +397,11 @@ class OptionsAxis(Axis):
 
     def choices(self, name: str) -> list[Choice]:
         """Return a choice for each option."""
-        return [
-            Choice({name: label}, tuple((key_path(k), v) for k, v in changes.items()))
-            for label, changes in self.options.items()
-        ]
+        choices = []
+        for label, settings in self.options.items():
+            changes = [(key_path(key), value) for key, value in settings.items()]
+            choices.append(Choice({name: label}, tuple(changes)))
+        return choices
 
 
 class SampleAxis(Axis):

@@ -5,7 +5,7 @@ import itertools
 import json
 import math
 import platform
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -337,10 +337,11 @@ def matches(condition: Mapping[str, Any], labels: Mapping[str, Label]) -> bool:
     >>> matches({"robot": ["patrol", "hangout"]}, {"robot": "hangout", "speed": 0.3})
     True
     """
-    return all(
-        any(same_label(labels.get(column), value) for value in _values(condition, column))
-        for column in condition
-    )
+    return all(_is_among(labels.get(column), _values(condition, column)) for column in condition)
+
+
+def _is_among(label: Label, values: Iterable[Any]) -> bool:
+    return any(same_label(label, value) for value in values)
 
 
 def _values(condition: Mapping[str, Any], column: str) -> Sequence[Any]:
@@ -539,7 +540,7 @@ def _occurs(design: Design, condition: Mapping[str, Any]) -> bool:
     for number, axis in enumerate(design.axes):
         for column in {*axis.columns} & {*condition}:
             values = _values(condition, column)
-            fulfils = [any(same_label(x, v) for v in values) for x in axis.labels()[column]]
+            fulfils = [_is_among(label, values) for label in axis.labels()[column]]
             occurs &= np.isin(design.combinations[:, number], np.flatnonzero(fulfils))
     return bool(occurs.any())
 

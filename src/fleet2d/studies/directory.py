@@ -125,6 +125,11 @@ class Meta(BaseModel):
         facts, last = self._facts(metric)
         return facts.units.get(last, facts.unit)
 
+    def with_unit(self, metric: str) -> str:
+        """Return a metric with its unit, if it has one, as tables and axes name it."""
+        unit = self.unit(metric)
+        return f"{metric} [{unit}]" if unit else metric
+
     def limits(self, metric: str) -> Limits:
         """Return the least and the largest value that a metric can have; a share is 0 to 1."""
         return limits_of(*self._facts(metric))

@@ -92,14 +92,16 @@ def draw_comparison(table: "pl.DataFrame", axis: str, reference: Any, label: str
     """
     rows = table.to_dicts()[::-1]
     figure, axes = _figure(0.42 * len(rows) + 1.1)
+    inner_axes = table.columns[1 : table.get_column_index("mean")]
+    labels = []
     for y, row in enumerate(rows):
         color = COLORS[0] if row["clear"] else PALE
         if not row["doubt"]:
             axes.plot([row["low"], row["high"]], [y, y], color=color, lw=2.2, solid_capstyle="butt")
         axes.plot(row["difference"], y, "o", color=color, ms=6)
+        inner_labels = [f"{column} {row[column]}" for column in inner_axes]
+        labels.append(", ".join([str(row[axis]), *inner_labels]))
     axes.axvline(0, color=DARK, lw=0.8)
-    inner_axes = table.columns[1 : table.get_column_index("mean")]
-    labels = [", ".join([str(row[axis]), *(f"{c} {row[c]}" for c in inner_axes)]) for row in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(-0.6, len(rows) - 0.4)
     axes.set_xlabel(f"{label}: difference to {axis} = {reference}")

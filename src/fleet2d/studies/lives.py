@@ -310,22 +310,24 @@ class Draw:
         """
         key = row, needed
         if key not in self._eligible:
-            asked = {c: v for c, v in self._rows[row].items() if c in FEATURES} if row >= 0 else {}
-            self._eligible[key] = [
-                place
-                for place in range(len(self.homes))
-                if place not in self.facts
-                or (
-                    self.facts[place].bedrooms >= needed
-                    and all(_is_like(c, getattr(self.facts[place], c), v) for c, v in asked.items())
-                )
-            ]
+            listed = self._rows[row].items() if row >= 0 else ()
+            asked = {column: value for column, value in listed if column in FEATURES}
+            places = range(len(self.homes))
+            self._eligible[key] = [p for p in places if self._may_be(p, needed, asked)]
             if not self._eligible[key]:
                 words = ", ".join(f"{column} {value}" for column, value in asked.items())
                 words = words or f"{needed} bedrooms, as a household needs"
                 where = f"{self._settings.table}, row {row + 1}: " if asked else ""
                 raise ScenarioError(f"{where}no home has {words}")
         return self._eligible[key]
+
+    def _may_be(self, place: int, needed: int, asked: Mapping[str, Any]) -> bool:
+        """Return whether a home has so many bedrooms and what is asked; True if it is unknown."""
+        facts = self.facts.get(place)
+        if facts is None:
+            return True
+        are_like = (_is_like(name, getattr(facts, name), value) for name, value in asked.items())
+        return facts.bedrooms >= needed and all(are_like)
 
     def left_out(self, life: FleetLife, facts: HomeFeatures | None) -> str:
         """Return the condition that a life doesn't meet, empty if it meets all.

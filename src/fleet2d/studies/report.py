@@ -4,7 +4,7 @@ import base64
 import html
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import timedelta
 from pathlib import Path
 from statistics import median_high
@@ -172,7 +172,7 @@ class _Page:
         from fleet2d.studies.figures import draw_comparison, draw_course, draw_unit_differences
 
         ((axis, reference),) = asked.against.items()
-        label = self._label(metric)
+        label = self.meta.with_unit(metric)
         table = pl.DataFrame([each.row() for each in found], infer_schema_length=None)
         yield self._figure(draw_comparison(table, axis, reference, label), name)
         within = (axis, *asked.within)
@@ -194,9 +194,8 @@ class _Page:
             others = [column for column in asked.within if column != unit]
             rows = self._shortened(self.study.differences(metric, asked.against, unit, others))
             yield f"<h3>in each {html.escape(unit)}</h3>"
-            yield self._figure(
-                draw_unit_differences(rows, (axis, *others), unit, label), f"{name}-{unit}"
-            )
+            figure = draw_unit_differences(rows, (axis, *others), unit, label)
+            yield self._figure(figure, f"{name}-{unit}")
         course = over_time(self.study, metric)
         if course is not None and course["day"].n_unique() > 1:
             yield "<h3>over time</h3>"
@@ -219,10 +218,10 @@ class _Page:
                 for row in table.to_dicts():
                     value = text_of(row.pop(axis)) if axis else "all"
                     label = f"{axis} = {value}" if axis else value
-                    means.append({"number": self._label(metric), "in": label, **row})
+                    means.append({"number": self.meta.with_unit(metric), "in": label, **row})
             of_it = study.shares(metric)
             largest = of_it.head(MAX_SHARES).extend(of_it.tail(1)).unique(maintain_order=True)
-            shares += [{"number": self._label(metric), **row} for row in largest.to_dicts()]
+            shares += [{"number": self.meta.with_unit(metric), **row} for row in largest.to_dicts()]
             if of_it["share"].sum() > 1 + NOISE:
                 overlapping.append(metric)
         if means:
@@ -234,16 +233,18 @@ class _Page:
         if overlapping:
             names = html.escape(", ".join(overlapping))
             yield f"<p>Shares overlap, as not all combinations have a number, of {names}.</p>"
-        facts = {name.split(".")[0]: self.meta.metrics.get(name.split(".")[0]) for name in known}
-        terms = [
-            f"<dt>{html.escape(name)}</dt><dd>{html.escape(fact.description)}</dd>"
-            for name, fact in facts.items()
-            if fact is not None and fact.description
-        ]
-        yield f"<dl>{''.join(terms)}</dl>"
+        outputs = dict.fromkeys(metric.partition(".")[0] for metric in known)
+        yield f"<dl>{''.join(map(self._described, outputs))}</dl>"
         if len(known) > MAX_METRICS:
             more = len(known) - MAX_METRICS
             yield f"<p>{more} more numbers are in <code>variants.parquet</code>.</p>"
+
+    def _described(self, metric: str) -> str:
+        """Return a metric with its description; empty if it has none."""
+        fact = self.meta.metrics.get(metric)
+        if fact is None or not fact.description:
+            return ""
+        return f"<dt>{html.escape(metric)}</dt><dd>{html.escape(fact.description)}</dd>"
 
     def _methods(self) -> Iterator[str]:
         """Yield a paragraph that can be cited, and the names of the units."""
@@ -305,9 +306,9 @@ class _Page:
         """Yield percentiles, the worst robots and groups, by what is compared or can be judged."""
         asked = {c.metric: c.against for c in reversed(self.answer.asked)}
         judged = [name for name in self.study.metrics if self.study.better(name)]
-        for metric in [*asked, *(name for name in judged if name not in asked)][:MAX_METRICS]:
+        for metric in list(dict.fromkeys([*asked, *judged]))[:MAX_METRICS]:
             name = f"fleet_{_file_name(metric)}"
-            yield f"<h2>{html.escape(self._label(metric))} over robots</h2>"
+            yield f"<h2>{html.escape(self.meta.with_unit(metric))} over robots</h2>"
             yield self._frame(self.study.percentiles(metric), f"{name}_percentiles")
             found = self.study.groups(metric, asked.get(metric))
             if len(found):
@@ -326,11 +327,6 @@ class _Page:
             table = failures.select("variant", *self.study.columns, "error").head(50)
             yield self._frame(table, "failures", (*self.study.columns, "error"))
 
-    def _label(self, metric: str) -> str:
-        """Return a metric with its unit, as axes of figures name it."""
-        unit = self.meta.unit(metric)
-        return f"{metric} [{unit}]" if unit else metric
-
     def _name(self, column: str, label: Any) -> Any:
         """Return a label as the report shows it."""
         return self.names.get(column, {}).get(label, label)
@@ -339,11 +335,10 @@ class _Page:
         """Return a frame with the short names of units."""
         import polars as pl
 
-        changes = [
-            pl.col(column).replace(names)
-            for column, names in self.names.items()
-            if column in frame.columns and any(short != label for label, short in names.items())
-        ]
+        changes = []
+        for column, names in self.names.items():
+            if column in frame.columns and list(names) != list(names.values()):
+                changes.append(pl.col(column).replace(names))
         return frame.with_columns(changes)
 
     def _figure(self, figure: "Figure", name: str) -> str:
@@ -376,12 +371,20 @@ def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
     longest = max(map(len, texts), default=0)
     if longest <= LONG_NAME:
         return dict(zip(labels, labels, strict=True))
-    lengths = range(SHORT_NAME, longest + 1)
-    starts = ([text[:n] for text in texts] for n in lengths)
-    ends = ([f"…{text[-n:]}" for text in texts] for n in lengths)
-    unique = (next(n for n in names if len(set(n)) == len(set(texts))) for names in (starts, ends))
-    shortest = min(unique, key=lambda names: max(map(len, names)))
+    starts = _shortest_unique(texts, lambda text, length: text[:length])
+    ends = _shortest_unique(texts, lambda text, length: f"…{text[-length:]}")
+    shortest = min(starts, ends, key=lambda names: max(map(len, names)))
     return dict(zip(labels, shortest, strict=True))
+
+
+def _shortest_unique(texts: Sequence[str], part_of: Callable[[str, int], str]) -> list[str]:
+    """Return a part of each text, as short as tells different texts apart."""
+    length = SHORT_NAME
+    while True:
+        parts = [part_of(text, length) for text in texts]
+        if len(set(parts)) == len(set(texts)):
+            return parts
+        length += 1
 
 
 def _file_name(metric: str) -> str:

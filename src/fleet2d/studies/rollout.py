@@ -79,30 +79,24 @@ def looks_of(
     looks = []
     for day in days:
         has: Bool = begins <= day
-        seen = np.where(has, treated[:, day], without[:, day])
-        known = np.isfinite(seen) & np.isfinite(without[:, day]) & np.isfinite(before)
-        own, others = seen[has & known], seen[~has & known]
-        truth = own - without[:, day][has & known]
-        difference = low = high = math.nan
-        if len(own) and len(others):
-            slope = _slope(seen[known], before[known], has[known])
-            sides = [own - slope * before[has & known], others - slope * before[~has & known]]
-            difference = float(sides[0].mean() - sides[1].mean())
-            if min(len(own), len(others)) >= ENOUGH_UNITS:
-                low, high = two_sample_interval(sides[0], sides[1], level)
-        with_it = len(own) > 0
-        looks.append(
-            RolloutLook(
-                day + 1,
-                len(own),
-                len(others),
-                difference,
-                low,
-                high,
-                float(truth.mean()) if with_it else math.nan,
-                float(without[:, day][has & known].mean()) if with_it else math.nan,
-            )
-        )
+        otherwise = without[:, day]
+        seen = np.where(has, treated[:, day], otherwise)
+        known = np.isfinite(seen) & np.isfinite(otherwise) & np.isfinite(before)
+        is_own = has & known
+        is_other = ~has & known
+        own = int(is_own.sum())
+        others = int(is_other.sum())
+        difference = low = high = truth = mean_without = math.nan
+        if own:
+            truth = float((seen - otherwise)[is_own].mean())
+            mean_without = float(otherwise[is_own].mean())
+        if own and others:
+            adjusted = seen - _slope(seen[known], before[known], has[known]) * before
+            difference = float(adjusted[is_own].mean() - adjusted[is_other].mean())
+            if min(own, others) >= ENOUGH_UNITS:
+                low, high = two_sample_interval(adjusted[is_own], adjusted[is_other], level)
+        look = RolloutLook(day + 1, own, others, difference, low, high, truth, mean_without)
+        looks.append(look)
     return looks
 
 
@@ -165,9 +159,7 @@ class RolloutAnswer:
     def _first_day(self, stage: str) -> int:
         if stage == NEVER:
             return 1 << 40
-        return max(
-            0, math.floor((datetime.fromisoformat(stage) - self.start).total_seconds() / DAY_S)
-        )
+        return max(0, (datetime.fromisoformat(stage) - self.start) // timedelta(days=1))
 
     def _days_of(self, metric: str) -> tuple[F64, F64]:
         """Return a metric without the change and with it: float64 (robots, days) each."""
@@ -220,7 +212,8 @@ class RolloutAnswer:
         begins = [self._first_day(stage) for stage in self._rows[STAGE].unique().to_list()]
         stages = [
             f"{int((self._begins == day).sum()):,} from {self.date_of(day + 1)} on"
-            for day in sorted(day for day in begins if day < len(self.days) + max(self.days) + 1)
+            for day in sorted(begins)
+            if day < len(self.days) + max(self.days) + 1
         ]
         texts = [f"The change reaches {', '.join(stages)}, of {len(self._rows):,} robots."]
         if self.stop is not None:
@@ -267,10 +260,14 @@ class RolloutAnswer:
 
     def _not_stopped(self) -> str:
         """Return which guards didn't stop the rollout, and which never could have."""
-        guards = self.settings.guards
-        blind = [m for m in guards if all(math.isnan(look.low) for look in self.looks[m])]
+        seen: list[str] = []
+        blind: list[str] = []
+        for metric in self.settings.guards:
+            is_blind = all(math.isnan(look.low) for look in self.looks[metric])
+            kind = blind if is_blind else seen
+            kind.append(metric)
         parts = []
-        if seen := [metric for metric in guards if metric not in blind]:
+        if seen:
             parts.append(f"No guard stops it: {', '.join(seen)}.")
         if blind:
             parts.append(
@@ -326,23 +323,17 @@ class RolloutAnswer:
         import matplotlib.pyplot as plt
 
         names = list(self.looks)
-        figure, axes = plt.subplots(
-            len(names), 1, sharex=True, figsize=(7, 2.6 * len(names)), squeeze=False
-        )
+        size = (7, 2.6 * len(names))
+        figure, axes = plt.subplots(len(names), 1, sharex=True, figsize=size, squeeze=False)
         for axis, metric in zip(axes[:, 0], names, strict=True):
             looks = self.looks[metric]
             days = [look.day for look in looks]
-            axis.fill_between(
-                days,
-                [k.low for k in looks],
-                [k.high for k in looks],
-                alpha=0.25,
-                lw=0,
-                label="known, on any day",
-            )
-            axis.plot(days, [k.difference for k in looks], lw=1)
-            axis.plot(days, [k.truth for k in looks], "k--", lw=1, label="true")
-            for day in sorted({int(day) for day in self._begins if day <= self.days[-1]}):
+            low = [look.low for look in looks]
+            high = [look.high for look in looks]
+            axis.fill_between(days, low, high, alpha=0.25, lw=0, label="known, on any day")
+            axis.plot(days, [look.difference for look in looks], lw=1)
+            axis.plot(days, [look.truth for look in looks], "k--", lw=1, label="true")
+            for day in np.unique(self._begins[self._begins <= self.days[-1]]).tolist():
                 axis.axvline(day + 1, color="grey", lw=0.6)
             bounds = self.settings.guards.get(metric, Bounds())
             for end in (bounds.least, bounds.most):
@@ -351,8 +342,7 @@ class RolloutAnswer:
             if self.stop is not None and self.stop[0] == metric:
                 axis.axvline(self.stop[1].day, color="tab:red", lw=1.5)
             axis.axhline(0, color="grey", lw=0.4)
-            unit = self._study.meta.unit(metric)
-            axis.set_ylabel(f"{metric}\n[{unit}]" if unit else metric)
+            axis.set_ylabel(self._study.meta.with_unit(metric).replace(" [", "\n["))
         axes[0, 0].legend(frameon=False, fontsize="small")
         axes[-1, 0].set_xlabel(f"day, from {self.start.date()} on")
         return figure

@@ -48,10 +48,7 @@ class Conclusion:
     @property
     def content(self) -> dict[str, Any]:
         """The same for JSON, which has no NaN."""
-        rows = [
-            {name: None if is_missing(value) else value for name, value in row.items()}
-            for row in self.table
-        ]
+        rows = [_without_nan(row) for row in self.table]
         return {"question": self.question, "sentences": list(self.sentences), "table": rows}
 
     def __str__(self) -> str:
@@ -60,12 +57,7 @@ class Conclusion:
         lines += self.sentences
         if self.table:
             head, rows = cells_of(self.table[:MAX_ROWS])
-            widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-            padded = (
-                "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-                for row in (head, *rows)
-            )
-            lines += ["", *(line.rstrip() for line in padded), *self._rest]
+            lines += ["", *_aligned([head, *rows]), *self._rest]
         return "\n".join(lines)
 
     @property
@@ -88,11 +80,26 @@ def is_missing(value: Any) -> bool:
     return value is None or (isinstance(value, float) and not math.isfinite(value))
 
 
+def _without_nan(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: None if is_missing(value) else value for name, value in row.items()}
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows of cells as lines, with columns as wide as their widest cells."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(map(str.ljust, row, widths)).rstrip()
+
+
 def cells_of(rows: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
     """Return the heads of the columns of a table of answers that are shown, and its cells."""
     columns = [column for column in rows[0] if column not in NOT_SHOWN]
     head = [HEADINGS.get(c, c.removeprefix("n_").replace("_", " ")) for c in columns]
-    return head, [[cell(column, row) for column in columns] for row in rows]
+    return head, [_cells(row, columns) for row in rows]
+
+
+def _cells(row: Mapping[str, Any], columns: Sequence[str]) -> list[str]:
+    return [cell(column, row) for column in columns]
 
 
 def html_table(
@@ -130,7 +137,9 @@ def cell(column: str, row: Mapping[str, Any]) -> str:
 
 def text_of(value: Any) -> str:
     """Return a value of a table as text."""
-    return number(value) if isinstance(value, float) else "–" if value is None else str(value)
+    if value is None:
+        return "–"
+    return number(value) if isinstance(value, float) else str(value)
 
 
 def number(value: float) -> str:
@@ -286,10 +295,12 @@ class StudyAnswer:
         elif not self.asked:
             yield "There is nothing to compare: the table has the means."
         many = len(self.comparisons)
-        clear = sorted((c for c in self.comparisons if c.is_clear), key=lambda c: c.p_holm)
+        clear = [c for c in self.comparisons if c.is_clear]
+        clear.sort(key=lambda c: c.p_holm)
         if clear:
             corrected = f" (corrected for {many} comparisons)" if many > 1 else ""
-            yield f"Clear{corrected}: {listed([self._finding(c) for c in clear], 'difference')}."
+            findings = [self._finding(c) for c in clear]
+            yield f"Clear{corrected}: {listed(findings, 'difference')}."
             subject = "The first" if len(clear) > 1 else "It"
             yield self._for_whom(clear[0], subject)
         elif many:
@@ -323,8 +334,10 @@ class StudyAnswer:
             amount += f" [{unit}]"
         if c.estimate.doubt:
             side = int(c.direction == "lower")
-            signs = c.estimate.signs.items()
-            parts = [f"{s[side]} of {c.units.get(k, sum(s))} {plural(k)}" for k, s in signs]
+            parts = []
+            for kind, signs in c.estimate.signs.items():
+                number_of_units = c.units.get(kind, sum(signs))
+                parts.append(f"{signs[side]} of {number_of_units} {plural(kind)}")
             amount = f"in {' and '.join(parts)}; by how much can't be told, as {c.estimate.doubt}"
         return f"{c.metric} is {c.direction}{judgement}, with {self._sides(c)}, {amount}"
 
@@ -351,17 +364,20 @@ class StudyAnswer:
         kinds += self._varying(frame, populations=False)
         sign = 1 if c.difference > 0 else -1
         parts = []
-        for kind in (each for each in kinds if each not in c.labels):
-            columns = [column for column, _ in within]
+        columns = [column for column, _ in within]
+        for kind in kinds:
+            if kind in c.labels:
+                continue
             rows = study.differences(c.metric, {axis: c.reference}, kind, columns).drop_nulls(kind)
             if kind in study.meta.features and rows[kind].n_unique() > MAX_ROWS:
                 continue  # a number, such as an area
             for column, label in c.labels.items():
                 rows = rows.filter(rows[column].eq_missing(label))
             other = rows.filter(rows["difference"] * sign < 0)[kind].to_list()
-            names = f" ({', '.join(map(text_of, other))})" if len(other) <= MAX_NAMED else ""
-            text = f"{len(other) or 'none'} of {len(rows)} {plural(kind)}{names if other else ''}"
-            parts.append(text)
+            part = f"{len(other) or 'none'} of {len(rows)} {plural(kind)}"
+            if 0 < len(other) <= MAX_NAMED:
+                part += f" ({', '.join(map(text_of, other))})"
+            parts.append(part)
         return f"{subject} is the other way round in {' and '.join(parts)}." if parts else ""
 
     def _left_out(self) -> str:
@@ -389,18 +405,15 @@ class StudyAnswer:
 
     def _cost(self) -> str:
         study = self._study
-        simulated, wall = (
-            in_words(timedelta(seconds=float(frame[name].fill_null(0).sum())))
-            for frame, name in ((study.complete, "simulated_s"), (study.variants, "wall_s"))
-        )
+        simulated = in_words(timedelta(seconds=float(study.complete["simulated_s"].sum())))
+        wall = in_words(timedelta(seconds=float(study.variants["wall_s"].sum())))
         runs = counted(study.counts.complete, "run")
         return f"It took {runs}: {simulated} simulated in {wall} of computing."
 
     def _row(self, c: Comparison) -> dict[str, Any]:
-        unit = self._study.meta.unit(c.metric)
         low, high = c.interval
         return {
-            "number": f"{c.metric} [{unit}]" if unit else c.metric,
+            "number": self._study.meta.with_unit(c.metric),
             "compared": self._sides(c),
             "mean": c.mean,
             "reference": c.reference_mean,
@@ -413,6 +426,5 @@ class StudyAnswer:
         }
 
     def _mean(self, metric: str) -> dict[str, Any]:
-        unit = self._study.meta.unit(metric)
         (row,) = self._study.summary(metric, []).to_dicts()
-        return {"number": f"{metric} [{unit}]" if unit else metric, **row}
+        return {"number": self._study.meta.with_unit(metric), **row}

@@ -405,11 +405,10 @@ class Search:
     def _run_batch(self, trials: "list[optuna.Trial]") -> None:
         """Run trials, and tell Optuna what came of each."""
         keys = itertools.product(trials, self._variants)
-        search = self._settings.search
-        settings = {
-            trial.number: {name: suggested(trial, name, search[name]) for name in search}
-            for trial in trials
-        }
+        search = self._settings.search.items()
+        settings = {}
+        for trial in trials:
+            settings[trial.number] = {name: suggested(trial, name, each) for name, each in search}
         tasks = [
             TrialTask(place, index, "", home, trial.number, settings[trial.number])
             for place, (trial, (index, home)) in enumerate(keys)

@@ -62,9 +62,13 @@ def headline(gate: Gate) -> str:
     what = "fails" if worse == 1 else "fail"
     if gate.against:
         what = f"{'is' if worse == 1 else 'are'} worse than with {gate.against}"
-    parts = [f"{worse} of {tests} {what}"] if worse else []
-    parts += [f"{counted(broken, 'test')} can't be run"] if broken else []
-    parts += [held] if number and not worse else []
+    parts = []
+    if worse:
+        parts.append(f"{worse} of {tests} {what}")
+    if broken:
+        parts.append(f"{counted(broken, 'test')} can't be run")
+    if number and not worse:
+        parts.append(held)
     text = " and ".join(parts)
     return f"{subject} doesn't pass: {text}" if subject else text
 
@@ -126,9 +130,10 @@ def _failed(gate: Gate, ordered: Sequence[Tally]) -> str:
     parts = []
     for each in ordered:
         if each in gate.blocking:
-            change = gate.change_of.get((each.test, each.name))
-            is_worse = change is not None and change.worse
-            how = f"is {change.brief()}" if change is not None and is_worse else _how_often(each)
+            change = gate.change_of.get(each.place)
+            how = _how_often(each)
+            if change is not None and change.worse:
+                how = f"is {change.brief()}"
             parts.append(f"{_name(gate, each)} {how}")
     return f"{listed(parts, 'expectation')}." if parts else ""
 
@@ -141,10 +146,12 @@ def _beyond(gate: Gate, ordered: Sequence[Tally]) -> str:
         if each in gate.known:
             often = f"in {len(each.failed) or len(each.errors)} of {counted(each.trials, 'trial')}"
             texts.append(f"{gate.known_as}, {often}")
-        change = gate.change_of.get((each.test, each.name))
+        change = gate.change_of.get(each.place)
         if change is not None and each not in gate.blocking:
-            texts += [f"is {change.brief()}"] if change.differs else []
-            texts += [change.nearer()] if change.is_narrower and not change.differs else []
+            if change.differs:
+                texts.append(f"is {change.brief()}")
+            elif change.is_narrower:
+                texts.append(change.nearer())
         if texts:
             parts.append(f"{_name(gate, each)} {' and '.join(texts)}")
     return f"{listed(parts, 'expectation')}." if parts else ""
@@ -243,7 +250,7 @@ def _unseen(gate: Gate, ordered: Sequence[Tally]) -> str:
 
 def _more(gate: Gate, each: Tally) -> str:
     """Return how many more trials would show a difference that isn't clear; empty if it is."""
-    change = gate.change_of.get((each.test, each.name))
+    change = gate.change_of.get(each.place)
     if change is None or change.direction or change.worse_units == change.better_units:
         return ""
     for times in range(2, MAX_TIMES + 1):
@@ -264,16 +271,19 @@ def _row(gate: Gate, each: Tally) -> dict[str, Any]:
     if any(tally.claim is not None and tally.claim.holds < 1 for tally in gate.tallies):
         row["claim"] = "–" if each.claim is None else percent(each.claim.holds)
     row["held"] = f"{each.held} of {each.trials}"
-    row["held"] += f", {untested} untested" if untested else ""
+    if untested:
+        row["held"] += f", {untested} untested"
     row["95 % interval"] = f"{percent(low)} to {percent(high)}" if each.outcomes else "–"
     row["margin"] = least_margin(each) or "–"
     row["worst in"] = each.failed[0].label if each.failed else "–"
     if gate.against:
-        change = gate.change_of.get((each.test, each.name))
-        numbers = {} if change is None else {"worse": change.worse, "better": change.better}
-        parts = [f"{len(keys)} {word}" for word, keys in numbers.items() if keys]
-        same = "–" if change is None else "same"
-        row[f"than {gate.against}"] = ", ".join(parts) or same
+        change = gate.change_of.get(each.place)
+        difference = "–"
+        if change is not None:
+            numbers = {"worse": change.worse, "better": change.better}
+            parts = [f"{len(keys)} {word}" for word, keys in numbers.items() if keys]
+            difference = ", ".join(parts) or "same"
+        row[f"than {gate.against}"] = difference
     return row
 
 

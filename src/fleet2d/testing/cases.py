@@ -303,7 +303,9 @@ class _Suite:
             return ""
         test = next(test for test in self.tests if test.name == each.test)
         outcome = each.outcomes.get(key)
-        at = "" if outcome is None or outcome.step is None else f" --at 'step {outcome.step}'"
+        at = ""
+        if outcome is not None and outcome.step is not None:
+            at = f" --at 'step {outcome.step}'"
         if out is not None and key in self.files:
             return f"see it: fleet2d show {self.files[key][0]}{at}"
         run = test.command(key, self.builds[0], FAILURES)
@@ -322,20 +324,25 @@ class _Suite:
     def content(self) -> list[dict[str, object]]:
         """Return the trials as plain JSON data."""
         return [
-            {
-                "test": report.key.test,
-                "build": build.name,
-                "seed": report.key.seed,
-                **({"home": report.key.home} if report.key.home else {}),
-                "holds": report.holds,
-                "error": report.error or None,
-                "wall_s": report.wall_s,
-                "expectations": {o.name: o.content for o in report.outcomes},
-                "files": [str(path) for path in self.files.get(report.key, ())],
-            }
+            self._trial_content(build.name, report)
             for build, reports in zip(self.builds, self.reports, strict=True)
             for report in reports
         ]
+
+    def _trial_content(self, build: str, report: "TrialReport") -> dict[str, object]:
+        """Return a trial of a build as plain JSON data."""
+        key = report.key
+        return {
+            "test": key.test,
+            "build": build,
+            "seed": key.seed,
+            **({"home": key.home} if key.home else {}),
+            "holds": report.holds,
+            "error": report.error or None,
+            "wall_s": report.wall_s,
+            "expectations": {outcome.name: outcome.content for outcome in report.outcomes},
+            "files": [str(path) for path in self.files.get(key, ())],
+        }
 
 
 def _build_of(text: str) -> "Build":
@@ -356,7 +363,7 @@ def _build_of(text: str) -> "Build":
 
 def _to_see(gate: "Gate", each: "Tally") -> "list[TrialKey]":
     """Return the trials that show a failure, the worst first; those that got worse come first."""
-    change = gate.change_of.get((each.test, each.name))
+    change = gate.change_of.get(each.place)
     worse = set(change.worse) if change is not None else set()
     failed = each.failed or [report.key for report in each.errors]
     return sorted(failed, key=lambda key: key not in worse)

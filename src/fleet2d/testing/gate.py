@@ -51,6 +51,11 @@ class Tally:
     declared: frozenset[str] = frozenset()
 
     @property
+    def place(self) -> Place:
+        """The names of its test and of the expectation."""
+        return self.test, self.name
+
+    @property
     def title(self) -> str:
         """The expectation with its test, and with what it covers."""
         covers = f" ({', '.join(sorted(self.covers))})" if self.covers else ""
@@ -103,6 +108,19 @@ class Tally:
         for key, outcome in self.outcomes.items():
             by_home.setdefault(key.home, []).append(not outcome.fails)
         return nested_rate_interval(list(by_home.values())) if by_home else (0.0, 1.0)
+
+    def content(self) -> dict[str, Any]:
+        """Return it as plain JSON data."""
+        return {
+            "test": self.test,
+            "expectation": self.name,
+            "covers": sorted(self.covers),
+            "verdict": self.verdict,
+            "trials": self.trials,
+            "held": self.held,
+            "failed": [key.label for key in self.failed],
+            "rate": list(self.rate),
+        }
 
     def sentence(self) -> str:
         """Return what failed in how many trials, and how in the worst."""
@@ -217,6 +235,11 @@ class PairedChange(NamedTuple):
         return self.p_shift <= ERROR and self.narrower > self.wider
 
     @property
+    def place(self) -> Place:
+        """The names of the test and of the expectation."""
+        return self.test, self.name
+
+    @property
     def title(self) -> str:
         """The expectation with its test."""
         return f"{self.name} of {self.test}"
@@ -225,6 +248,12 @@ class PairedChange(NamedTuple):
     def differs(self) -> bool:
         """Whether any verdict does."""
         return bool(self.worse or self.better)
+
+    def content(self) -> dict[str, Any]:
+        """Return it as plain JSON data."""
+        worse = [key.label for key in self.worse]
+        better = [key.label for key in self.better]
+        return {**self._asdict(), "worse": worse, "better": better}
 
     def words(self) -> str:
         """Return in how many trials it differs, in which, and whether that may be chance."""
@@ -276,10 +305,10 @@ def compare(new: Sequence[Tally], old: Sequence[Tally]) -> list[PairedChange]:
 
     Trials of several homes count by homes, as those of one home are no independent pairs.
     """
-    before = {(each.test, each.name): each.outcomes for each in old}
+    before = {each.place: each.outcomes for each in old}
     changes = []
     for each in new:
-        earlier = before.get((each.test, each.name), {})
+        earlier = before.get(each.place, {})
         pairs = {
             key: (outcome, earlier[key])
             for key, outcome in each.outcomes.items()
@@ -311,6 +340,7 @@ def _change(
     }
     worse_units, better_units = _by_unit(signs, several)
     narrower, wider = _by_unit(shifts, several)
+    differing = list(filter(None, shifts.values()))
     units = {new.unit for new, _ in pairs.values()}
     return PairedChange(
         tally.test,
@@ -323,7 +353,7 @@ def _change(
         better_units,
         sign_test(worse_units, better_units),
         1.0,
-        median(filter(None, shifts.values())) if any(shifts.values()) else None,
+        median(differing) if differing else None,
         units.pop() if len(units) == 1 else "",
         narrower,
         wider,
@@ -358,6 +388,15 @@ class RequirementCoverage(NamedTuple):
         """The worst of them; or that there are none."""
         return min(self.verdicts.values(), key=RANKING.index, default=NOT_COVERED)
 
+    def content(self) -> dict[str, Any]:
+        """Return it as plain JSON data."""
+        return {
+            "requirement": self.requirement,
+            "text": self.text,
+            "verdict": self.verdict,
+            "by": [[*place, verdict] for place, verdict in self.verdicts.items()],
+        }
+
 
 def read_requirement_list(path: Path) -> dict[str, str]:
     """Return the requirements of a YAML file by id: a mapping of ids and texts.
@@ -387,7 +426,7 @@ def cover(
                     f"{each.name} of {each.test} covers {requirement}, which isn't among the"
                     f" requirements{suggest(requirement, requirements)}"
                 )
-            rows.setdefault(requirement, {})[each.test, each.name] = each.verdict
+            rows.setdefault(requirement, {})[each.place] = each.verdict
     texts = requirements if requirements is not None else dict.fromkeys(sorted(rows), "")
     return [RequirementCoverage(name, text, rows[name]) for name, text in texts.items()]
 
@@ -423,7 +462,7 @@ class Gate:
     @cached_property
     def change_of(self) -> Mapping[Place, PairedChange]:
         """The changes by test and expectation."""
-        return {(change.test, change.name): change for change in self.changes}
+        return {change.place: change for change in self.changes}
 
     @cached_property
     def short(self) -> Mapping[str, str]:
@@ -441,14 +480,14 @@ class Gate:
         Without another build that is all that fails unexpectedly; else what is clearly worse, what
         fails and didn't, and what can't be run.
         """
-        failing = {(each.test, each.name) for each in self.before if each.fails}
+        failing = {each.place for each in self.before if each.fails}
         found = []
         for each in self.tallies:
-            place = each.test, each.name
-            is_known = place in failing and each.verdict != BROKEN
-            is_known |= each.test in self.expected
-            change = self.change_of.get(place)
-            if (each.fails and not is_known) or (change is not None and change.direction < 0):
+            failed_before = each.place in failing and each.verdict != BROKEN
+            is_known = failed_before or each.test in self.expected
+            change = self.change_of.get(each.place)
+            is_worse = change is not None and change.direction < 0
+            if is_worse or (each.fails and not is_known):
                 found.append(each)
         return found
 
@@ -470,7 +509,7 @@ class Gate:
     def details(self, hints: Mapping[Tally, str]) -> Iterator[str]:
         """Yield what failed and how, and how to see it."""
         for each in self.blocking:
-            change = self.change_of.get((each.test, each.name))
+            change = self.change_of.get(each.place)
             yield each.sentence()
             if change is not None:
                 yield f"  compared with {self.against}: {change.words()}"
@@ -485,39 +524,14 @@ class Gate:
             "passes": self.passes,
             "build": self.build,
             "against": self.against,
-            "expectations": [
-                {
-                    "test": each.test,
-                    "expectation": each.name,
-                    "covers": sorted(each.covers),
-                    "verdict": each.verdict,
-                    "trials": each.trials,
-                    "held": each.held,
-                    "failed": [key.label for key in each.failed],
-                    "rate": list(each.rate),
-                }
-                for each in self.tallies
-            ],
-            "changes": [
-                {
-                    **change._asdict(),
-                    "worse": [key.label for key in change.worse],
-                    "better": [key.label for key in change.better],
-                }
-                for change in self.changes
-            ],
-            "coverage": [
-                {
-                    "requirement": row.requirement,
-                    "text": row.text,
-                    "verdict": row.verdict,
-                    "by": [[*place, verdict] for place, verdict in row.verdicts.items()],
-                }
-                for row in self.coverage
-            ],
-            "history": {
-                build: [[*place, *numbers] for place, numbers in row.items()]
-                for build, row in self.trend.items()
-            },
+            "expectations": [each.content() for each in self.tallies],
+            "changes": [change.content() for change in self.changes],
+            "coverage": [row.content() for row in self.coverage],
+            "history": {build: _held_by_place(row) for build, row in self.trend.items()},
             "notes": list(self.notes),
         }
+
+
+def _held_by_place(row: Mapping[Place, tuple[int, int]]) -> list[list[str | int]]:
+    """Return test, expectation, and how often it held of how many, as rows."""
+    return [[*place, *numbers] for place, numbers in row.items()]

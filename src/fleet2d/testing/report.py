@@ -90,18 +90,17 @@ def _comparison(gate: Gate) -> Iterator[str]:
     rows = []
     for change in gate.changes:
         kind = {-1: "bad", 1: "good"}.get(change.direction, "odd" if change.worse else "")
-        rows.append(
-            [
-                _cell(gate.short[change.test]),
-                _cell(change.name),
-                _cell(f"{change.pairs}"),
-                _cell(f"{len(change.worse)}", kind if change.worse else ""),
-                _cell(f"{len(change.better)}", kind if change.better else ""),
-                _cell(f"{change.p_holm:.2g}"),
-                _cell(_shift(change), "odd" if change.is_narrower else ""),
-                _cell(listed(change.worse or change.better)),
-            ]
-        )
+        cells = [
+            _cell(gate.short[change.test]),
+            _cell(change.name),
+            _cell(f"{change.pairs}"),
+            _cell(f"{len(change.worse)}", kind if change.worse else ""),
+            _cell(f"{len(change.better)}", kind if change.better else ""),
+            _cell(f"{change.p_holm:.2g}"),
+            _cell(_shift(change), "odd" if change.is_narrower else ""),
+            _cell(listed(change.worse or change.better)),
+        ]
+        rows.append(cells)
     head = ["test", "expectation", "trials", "worse", "better", "p (Holm)", "margin", "which"]
     yield _table(head, rows) if rows else "<p>No trial is the same: nothing is compared.</p>"
 
@@ -153,7 +152,7 @@ def _trend(gate: Gate) -> Iterator[str]:
     builds = list(gate.trend)[-MAX_BUILDS:]
     if not builds:
         return
-    shown = {(each.test, each.name) for each in gate.tallies}
+    shown = {each.place for each in gate.tallies}
     places = dict.fromkeys(place for build in builds for place in gate.trend[build])
     rows = []
     for place in places:
@@ -162,8 +161,10 @@ def _trend(gate: Gate) -> Iterator[str]:
         cells = [_cell(gate.short[place[0]]), _cell(place[1])]
         for build in builds:
             held, number = gate.trend[build].get(place, (0, 0))
-            kind = "" if not number else "good" if held == number else "odd" if held else "bad"
-            cells.append(_cell(f"{held} of {number}" if number else "", kind))
+            kind = "odd" if held else "bad"
+            if held == number:
+                kind = "good"
+            cells.append(_cell(f"{held} of {number}", kind) if number else _cell(""))
         rows.append(cells)
     yield "<h2>History</h2><p>In how many trials each expectation held, by build.</p>"
     yield _table(["test", "expectation", *builds], rows)

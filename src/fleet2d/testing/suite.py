@@ -2,6 +2,7 @@
 
 import hashlib
 import inspect
+import itertools
 import json
 import math
 import shlex
@@ -26,7 +27,15 @@ from fleet2d.studies.executors import TaskQueue, WorkerTask, by_home, cores, run
 from fleet2d.studies.simulator import describe_error
 from fleet2d.testing.claim import HOME, Claim, RateTest, Variant, rate_test
 from fleet2d.testing.search import claimed_test, claimed_tests
-from fleet2d.testing.trials import ASSERT, Body, Trial, TrialResult, asserts, run_trial
+from fleet2d.testing.trials import (
+    ASSERT,
+    Body,
+    Trial,
+    TrialResult,
+    asserts,
+    margin_of,
+    run_trial,
+)
 
 FIRST_SEED = 1
 PATIENCE_S = 3.0
@@ -88,9 +97,11 @@ NO_TRIAL = TrialKey("", "", 0)
 
 def key_of(test: str, variant: Variant) -> TrialKey:
     """Return the key of a trial of a test."""
-    labels = {n: v for n, v in variant.labels.items() if n != "seed" and v is not None}
-    home = ", ".join(str(v) if n == HOME else f"{n} {v}" for n, v in labels.items())
-    return TrialKey(test, home, variant.seed)
+    parts = []
+    for name, label in variant.labels.items():
+        if name != "seed" and label is not None:
+            parts.append(str(label) if name == HOME else f"{name} {label}")
+    return TrialKey(test, ", ".join(parts), variant.seed)
 
 
 @dataclass(frozen=True)
@@ -227,7 +238,8 @@ class SuiteTest:
         """Return the command that repeats a trial and stores its run if it fails."""
         change = dict(self.homes).get(key.home, ())
         parts = [self.name, *self.overrides, *change, "--seed", str(key.seed)]
-        parts += ["--build", str(build.overlay)] if build.overlay else []
+        if build.overlay:
+            parts += ["--build", str(build.overlay)]
         return f"fleet2d test {shlex.join([*parts, '--out', out])}"
 
 
@@ -267,13 +279,14 @@ def collect(
                     "  expect: {keeps_off: 'always(distance(ana, astro) > 0.5 m)'}"
                 )
     if not tests:
-        raise InputError(
+        message = (
             f"{' '.join(arguments)}: no test there: a test is a scenario with a section `expect`,"
-            f" or a function with @trial in a file test_….py{''.join(f'; {n}' for n in notes)}"
+            " or a function with @trial in a file test_….py"
         )
-    return [
-        _with_trials(test, tuple(overrides), seeds, first, homes) for test in dict.fromkeys(tests)
-    ], notes
+        raise InputError("; ".join([message, *notes]))
+    different = dict.fromkeys(tests)
+    ready = [_with_trials(test, tuple(overrides), seeds, first, homes) for test in different]
+    return ready, notes
 
 
 def _with_trials(
@@ -285,14 +298,17 @@ def _with_trials(
 ) -> SuiteTest:
     """Return a test with its overrides, seeds and homes; see `collect`."""
     if test.function:
-        numbers = () if seeds is None else range(first or 0, (first or 0) + seeds)
-        only = first if seeds is None else None
         if homes is not None:
             raise InputError(f"{test.name}: --homes is for scenarios; write @trial(homes=…)")
-        return replace(test, overrides=overrides, seeds=tuple(numbers), only=only)
+        if seeds is None:
+            return replace(test, overrides=overrides, seeds=(), only=first)
+        begin = first or 0
+        return replace(test, overrides=overrides, seeds=tuple(range(begin, begin + seeds)))
     scenario = load_scenario(test.path, *overrides)
     own = scenario.simulation.seed
-    begin = first if first is not None else FIRST_SEED if own is None else own
+    begin = FIRST_SEED if own is None else own
+    if first is not None:
+        begin = first
     numbers = range(begin, begin + (seeds or 1))
     found = (("", ()),) if homes is None else tuple(_homes(homes, scenario))
     return replace(test, overrides=overrides, seeds=tuple(numbers), homes=found)
@@ -418,9 +434,7 @@ def _covers(expected: Mapping[str, Any], name: str) -> tuple[str, ...]:
 
 
 def _outcome(verdict: Verdict, covers: tuple[str, ...]) -> TrialOutcome:
-    margin, unit = verdict.robustness, verdict.unit
-    if not math.isfinite(margin) and verdict.slack_s is not None:
-        margin, unit = verdict.slack_s, "s"
+    margin, unit = margin_of(verdict)
     return TrialOutcome(
         verdict.name,
         verdict.holds,
@@ -454,18 +468,18 @@ def run_suite(
         show: Whether progress is shown.
     """
     job = SuiteJob(tuple(tests), tuple(builds))
+    number = itertools.count()
     tasks = [
-        SuiteTask(0, trial, "", each.name, keys[each.name][trial], test, build, trial)
+        SuiteTask(next(number), trial, "", each.name, keys[each.name][trial], test, build, trial)
         for test, each in enumerate(tests)
         for trial in numbers[each.name]
         for build in range(len(builds))
     ]
-    tasks = [replace(task, number=number) for number, task in enumerate(tasks)]
     found: dict[int, TrialReport] = {}
     with progress_bar(show=show) as bar:
         progress = bar.add_task("trials", total=len(tasks))
-        for number, report in _reports(job, tasks, workers or cores()):
-            found[number] = report
+        for place, report in _reports(job, tasks, workers or cores()):
+            found[place] = report
             bar.update(progress, completed=len(found))
     reports: list[list[TrialReport]] = [[] for _ in builds]
     for task in tasks:
@@ -495,8 +509,8 @@ def _reports(
 
 def run_name(key: TrialKey) -> str:
     """Return the name of the run directory of a trial."""
-    stem = Path(key.test.partition("::")[0]).stem
-    parts = [stem, key.test.partition("::")[2], key.home, f"seed-{key.seed}"]
+    file, _, function = key.test.partition("::")
+    parts = [Path(file).stem, function, key.home, f"seed-{key.seed}"]
     return "-".join(filter(None, map(file_name, parts)))
 
 

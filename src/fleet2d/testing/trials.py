@@ -109,14 +109,12 @@ class Trial(Simulation):
             minute *= 2
         if self.done:
             self.finish()  # some metrics are known at the end only
-        return tuple(
-            replace(
-                result_of(verdict, expectations.entries[name].expectation),
-                evidence=evidence_of(self, name) if verdict.fails else None,
-                covers=self._covers.get(name, ()),
-            )
-            for name, verdict in self.verdicts().items()
-        )
+        results = []
+        for name, verdict in self.verdicts().items():
+            result = result_of(verdict, expectations.entries[name].expectation)
+            evidence = evidence_of(self, name) if verdict.fails else None
+            results.append(replace(result, evidence=evidence, covers=self._covers.get(name, ())))
+        return tuple(results)
 
 
 def names_in(act: Intervention | Mapping[str, Any]) -> frozenset[str]:
@@ -174,11 +172,7 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
     if verdict.violations:
         first = verdict.violations[0]
         step = first.first if verdict.expectation.startswith(LASTING) else first.last
-    value = verdict.robustness
-    unit = verdict.unit
-    if not math.isfinite(value) and verdict.slack_s is not None:
-        value = verdict.slack_s
-        unit = "s"
+    value, unit = margin_of(verdict)
     margin = comparable(value, SCALES.get(unit, 1.0))
     if (margin > 0) != (verdict.holds is not False):  # fulfilled just in time, or just too late
         margin = -math.copysign(SMALLEST_MARGIN, margin)
@@ -199,13 +193,21 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
     )
 
 
+def margin_of(verdict: Verdict) -> tuple[float, str]:
+    """Return the margin of a verdict and its unit: without a finite one, its time to spare [s]."""
+    if not math.isfinite(verdict.robustness) and verdict.slack_s is not None:
+        return verdict.slack_s, "s"
+    return verdict.robustness, verdict.unit
+
+
 def kind_of(expectation: Term) -> str:
     """Return the kind of violation of an expectation, see `ExpectationResult`."""
     kinds = [kind_of(part) for part in expectation.parts()]
     if isinstance(expectation, eventually | until | at_end | after):
-        within = getattr(expectation, "within", None)
-        is_at_once = isinstance(expectation, after) and within is None
-        kinds += [] if is_at_once else [MISSED_BY_THE_END if within is None else MISSED]
+        if getattr(expectation, "within", None) is not None:
+            kinds.append(MISSED)
+        elif not isinstance(expectation, after):
+            kinds.append(MISSED_BY_THE_END)
     return next((kind for kind in (MISSED_BY_THE_END, MISSED) if kind in kinds), "")
 
 
@@ -285,8 +287,8 @@ class TrialResult:
     @property
     def first_failure(self) -> ExpectationResult | None:
         """The failure that came first, if there is one."""
-        at = self.steps if self.failures else 0
-        return min(self.failures, key=lambda f: at if f.step is None else f.step, default=None)
+        last = self.steps
+        return min(self.failures, key=lambda f: last if f.step is None else f.step, default=None)
 
     @property
     def failing_step(self) -> int:
@@ -337,20 +339,20 @@ class ClaimResult:
             if failures:
                 return f"{held}; all of them must hold"
             return f"{held}; at least {percent(rate.alternative)} was shown"
+        claimed = percent(rate.holds)
+        alternative = percent(rate.alternative)
         verb = "accepted" if self.holds else "refused"
-        shown = f"at least {percent(rate.alternative)}"
-        if not self.holds:
-            shown = f"less than {percent(rate.holds)}"
+        shown = f"at least {alternative}" if self.holds else f"less than {claimed}"
         by_variant: dict[str, list[bool]] = {}
         for trial in self.trials:
             labels = {**trial.variant.labels, "seed": None}
             by_variant.setdefault(repr(labels), []).append(trial.holds)
         low, high = nested_rate_interval(list(by_variant.values()), rate.error)
+        share = percent((number - failures) / number)
         return (
-            f"{held}: {percent(rate.holds)} {verb} after {number} of at most {rate.seeds}"
-            f" (error {percent(rate.error)}; distinguishes {percent(rate.holds)} from"
-            f" {percent(rate.alternative)}); {shown} was shown; rate"
-            f" {percent((number - failures) / number)}, {percent(low)} to {percent(high)}"
+            f"{held}: {claimed} {verb} after {number} of at most {rate.seeds}"
+            f" (error {percent(rate.error)}; distinguishes {claimed} from {alternative});"
+            f" {shown} was shown; rate {share}, {percent(low)} to {percent(high)}"
         )
 
 
@@ -423,13 +425,14 @@ def asserts(function: Any, depth: int = 4) -> bool:
     code = getattr(function, "__code__", None)
     if code is None or depth == 0:
         return False
-    codes = [code, *(const for const in code.co_consts if inspect.iscode(const))]
-    operations = {each.opname for code in codes for each in dis.get_instructions(code)}
-    if "LOAD_ASSERTION_ERROR" in operations or any("AssertionError" in c.co_names for c in codes):
-        return True
-    known = {name: function.__globals__.get(name) for each in codes for name in each.co_names}
-    cells = [cell.cell_contents for cell in function.__closure__ or ()]
-    return any(asserts(f, depth - 1) for f in [*known.values(), *cells] if inspect.isroutine(f))
+    called: list[Any] = []
+    for each in (code, *filter(inspect.iscode, code.co_consts)):
+        operations = {operation.opname for operation in dis.get_instructions(each)}
+        if "LOAD_ASSERTION_ERROR" in operations or "AssertionError" in each.co_names:
+            return True
+        called += map(function.__globals__.get, each.co_names)
+    called += [cell.cell_contents for cell in function.__closure__ or ()]
+    return any(asserts(each, depth - 1) for each in called if inspect.isroutine(each))
 
 
 def _line_of(error: AssertionError) -> str:
