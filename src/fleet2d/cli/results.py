@@ -122,8 +122,9 @@ def print_verdict(run: "Run", *, err: bool = False) -> None:
 def _since_start() -> float:
     """Return the wall time since this process started [s]."""
     try:
-        ticks = int(Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()[19])
-        return time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
+        _, fields = Path("/proc/self/stat").read_text().rsplit(")", 1)
+        began_s = int(fields.split()[19]) / os.sysconf("SC_CLK_TCK")
+        return time.clock_gettime(time.CLOCK_BOOTTIME) - began_s
     except (OSError, AttributeError, ValueError, IndexError):
         # Not on Linux: the time since this module was loaded.
         return time.perf_counter() - _LOADED

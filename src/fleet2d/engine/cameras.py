@@ -198,7 +198,7 @@ class Cameras(Watcher):
 
     def _set_up(self) -> SightMemory:
         owner = self.owner
-        lattice = owner.home.plan.lattice
+        lattice = owner.home.lattice
         clock = owner.clock
         cameras = owner.entity.eyes
         self.names = tuple(cameras)
@@ -242,7 +242,7 @@ class Cameras(Watcher):
     def _inject(self) -> SightMemory:
         """Set the false sightings of interventions; return an empty memory with room for them."""
         index = self.identities
-        lattice = self.owner.home.plan.lattice
+        lattice = self.owner.home.lattice
         rows = []
         for c, disturbance in self._disturbed():
             sighting = disturbance.injected
@@ -331,7 +331,7 @@ class Cameras(Watcher):
         seen = self.memory.seen.tolist()
         if 1 not in seen:  # a quick answer, as policies ask for it again and again
             return {}
-        xy_of = self.owner.home.plan.lattice.xy_of
+        xy_of = self.owner.home.lattice.xy_of
         places = self.perceived.tolist()
         identities = [identity for identity, is_seen in enumerate(seen) if is_seen]
         return {self.name_of(identity): xy_of(*places[identity]) for identity in identities}
@@ -388,7 +388,7 @@ class Cameras(Watcher):
         if not events:
             return
         stops = self.owner.plan.interrupts
-        lattice = self.owner.home.plan.lattice
+        lattice = self.owner.home.lattice
         identities = self.identities
         for event in events:
             if event.step == self.next_step - 1 and event.event in stops:
@@ -492,7 +492,7 @@ def _drift_of(owner: Actor) -> Drift | None:
     settings: Localization | None = getattr(owner.entity, "localization", None)
     if settings is None:
         return None
-    units_per_m = owner.home.plan.lattice.units_per_m
+    units_per_m = owner.home.lattice.units_per_m
     step_us = owner.clock.step_us
     return Drift(settings, units_per_m, step_us, owner.seed, owner.path, owner.displacements)
 
@@ -562,7 +562,8 @@ def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemor
     """
     about = old.about.copy()
     about[..., About.FORCED.value] = forced
-    rows = max(memory.backlog.shape[1], int(old.waiting[:, 1].max(initial=0)))
+    longest = int(old.waiting[:, 1].max(initial=0))
+    rows = max(memory.backlog.shape[1], longest)
     backlog = np.zeros((len(about), rows, len(SightingColumn)), np.int64)
     waiting = np.zeros_like(old.waiting)
     for c, (begin, length) in enumerate(old.waiting.tolist()):

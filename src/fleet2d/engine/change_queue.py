@@ -198,7 +198,7 @@ class ChangeQueue:
         for number, area in enumerate(self._floor):
             with errors_as(ScenarioError, f"floorplan.slows.{number}", of=PlacementError):
                 basis.home.plan.check_area(area.area)
-        self.home.slows = tuple(area.on(basis.home.plan.lattice) for area in self._floor)
+        self.home.slows = tuple(area.on(basis.home.lattice) for area in self._floor)
         # By step; those of one step happen in the order in which they were put into the queue.
         self._queue: list[tuple[int, int, DueChange]] = []
         self._count = 0
@@ -211,7 +211,7 @@ class ChangeQueue:
 
     def slow(self, areas: Sequence[SlowArea], step: int) -> None:
         """Set the areas that slow robots down, besides those of the floor plan, at a step."""
-        lattice = self.home.plan.lattice
+        lattice = self.home.lattice
         before = self.home.slows
         self.home.slows = tuple(area.on(lattice) for area in (*self._floor, *areas))
         robots = [actor for actor in self._actors if actor.entity.minds_floor]
@@ -354,7 +354,7 @@ class ChangeQueue:
 
     def _is_blocked(self, shape: F64) -> bool:
         """Whether a body stands where a shape [lattice units] is to be."""
-        units = self.home.plan.lattice.units_per_m
+        units = self.home.lattice.units_per_m
         for actor in self._actors:
             if not actor.state.away:
                 zone = grow_shape(shape, actor.entity.radius * units)
@@ -364,7 +364,7 @@ class ChangeQueue:
 
     def _stop(self, step: int, shape: F64 | None, actors: Sequence[Actor] | None = None) -> None:
         """Make bodies replan that have a blocked way, or walk at random along the walls."""
-        units = self.home.plan.lattice.units_per_m
+        units = self.home.lattice.units_per_m
         for actor in self._actors if actors is None else actors:
             if not isinstance(actor.motion, Track):
                 actor.ask(step)

@@ -113,7 +113,7 @@ class BlockedWays(Watcher):
     def plan(self, bodies: Bodies, now: Situation, other: int) -> Plan | None:
         """Return a plan to wait for another body, or to go round it; None to squeeze past."""
         row = now.actor.row
-        lattice = now.actor.home.plan.lattice
+        lattice = now.actor.home.lattice
         actor = self._actors[row]
         step = now.step
         step_us = actor.clock.step_us
@@ -176,7 +176,7 @@ class BlockedWays(Watcher):
 
     def _reach(self, row: int, others: I64) -> I64:
         """Return the distances at which a body touches others [lattice units], int64 (n,)."""
-        units_per_m = self._actors[row].home.plan.lattice.units_per_m
+        units_per_m = self._actors[row].home.lattice.units_per_m
         return ((self._radii[row] + self._radii[others]) * units_per_m).astype(np.int64)
 
 
@@ -292,7 +292,7 @@ class Clearance(Watcher):
 
     def surroundings(self, robot: DecidingActor) -> Surroundings:
         """Return the present places of people."""
-        units = robot.home.plan.lattice.units_per_m
+        units = robot.home.lattice.units_per_m
         present = []
         everybody = []
         for user in self._users:
@@ -317,7 +317,7 @@ class Clearance(Watcher):
         moves = moves[moves >= begin]
         if not len(moves):  # the usual case: it stands
             return None
-        units = robot.home.plan.lattice.units_per_m
+        units = robot.home.lattice.units_per_m
         first_meeting: tuple[int, int] | None = None
         now_x = x[moves]
         now_y = y[moves]

@@ -286,7 +286,7 @@ class Conversations(Watcher):
     def _addressed(self, row: int, meant: str, block: PoseBlock) -> int | None:
         """Return the user nearest to a robot, or the one meant at equal distance; None: nobody."""
         x, y = _point(row, block)
-        reach = round(EARSHOT_M * self.actors[row].home.plan.lattice.units_per_m)
+        reach = round(EARSHOT_M * self.actors[row].home.lattice.units_per_m)
         near = []
         for user in range(self.users):
             user_x, user_y = _point(user, block)
@@ -317,7 +317,7 @@ class Conversations(Watcher):
             company=0 if room is None else rooms.count(room) - 1,
             is_moving=bool((block.x[user, 1], block.y[user, 1]) != (x, y)),
             is_lying=bool(block.posture[user, 0] == LYING),
-            distance=math.sqrt(dx * dx + dy * dy) / home.plan.lattice.units_per_m,
+            distance=math.sqrt(dx * dx + dy * dy) / home.lattice.units_per_m,
             in_sight=line_of_sight(home.walls, x, y, robot_x, robot_y),
             from_behind=min(turn, TURN - turn) > FRONT,
         )
@@ -474,7 +474,7 @@ class Conversations(Watcher):
         block = bodies.block(step, step + 1)
         if robot.is_off or block.away[user, 0] or self._activity_at(user, step) in ASLEEP:
             return []
-        lattice = robot.home.plan.lattice
+        lattice = robot.home.lattice
         x, y = _point(user, block)
         if kind == "call":
             near = robot.space.nearest(x, y, robot.part) or robot.state.position

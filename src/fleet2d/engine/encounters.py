@@ -141,9 +141,10 @@ class Pair:
         is_inside = (self.distances <= limit * limit) & is_armed
         if not is_inside.any():
             return None
-        x, y = block.x[row, :count], block.y[row, :count]
-        last = self.at if self.at[0] >= 0 else (int(x[0]), int(y[0]))
-        moves = (np.diff(x, prepend=last[0]) != 0) | (np.diff(y, prepend=last[1]) != 0)
+        x = block.x[row, :count]
+        y = block.y[row, :count]
+        last_x, last_y = self.at if self.at[0] >= 0 else (x[0], y[0])
+        moves = (np.diff(x, prepend=last_x) != 0) | (np.diff(y, prepend=last_y) != 0)
         approaches = np.diff(self.distances, prepend=self.distance) < 0
         stands = block.posture[self.user.row, :count] == STANDING
         return _first(is_inside & moves & approaches & stands)
@@ -203,7 +204,7 @@ class Encounters(Watcher):
         for pair in self.pairs:
             last = [e for e in self._ahead if e.pair is pair and e.column == count - 1]
             pair.advance(block, count, [e.event for e in last])
-            x, y = pair.user.home.plan.lattice.to_metres(pair.at).tolist()
+            x, y = pair.user.home.lattice.to_metres(pair.at).tolist()
             events = (SightEvent(e.event, e.robot.name, x, y) for e in last)
             self._last += [(pair.user.row, pair.user, event) for event in events]
         return ()

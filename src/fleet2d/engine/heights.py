@@ -102,7 +102,7 @@ def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
     forward = corners @ ahead // UNIT
     across = corners @ left // UNIT
     back = forward.min()
-    depths = back - 1, back + round(BACK_M * home.plan.lattice.units_per_m)
+    depths = back - 1, back + round(BACK_M * home.lattice.units_per_m)
     sides = across.min() - 1, across.max() + 1
     box = [(depth * ahead + side * left) // UNIT for depth in depths for side in sides]
     behind = shapely.MultiPoint(box).convex_hull

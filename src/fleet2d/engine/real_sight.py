@@ -41,7 +41,7 @@ class RealSight(Cameras):
     def receive(self, step: int, sightings: Sequence[FalseSighting]) -> None:
         """Take in the perceptions of a real robot at a step that it has not looked at."""
         source = self.source
-        lattice = self.owner.home.plan.lattice
+        lattice = self.owner.home.lattice
         assert isinstance(source, LiveDetections)
         index = self.identities
         rows = np.zeros((len(sightings), SIGHTING), np.int64)

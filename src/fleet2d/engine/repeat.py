@@ -190,7 +190,8 @@ def branch(run: Run, step: int, out: Path | None = None) -> Simulation:
     for name in simulation.actors if step and "key_frames" in run.tables else ():
         path = run.path(name, interval)
         state = simulation.state[name]
-        if not np.allclose((path.x[1], path.y[1]), (state["x"], state["y"]), atol=1e-6):
+        was_at = path.x[1], path.y[1]
+        if not np.allclose(was_at, (state["x"], state["y"]), atol=1e-6):
             simulation.finish("failed")
             raise ArtifactError(
                 f"the run can't be repeated: at step {step} {name} would be elsewhere than it was;"

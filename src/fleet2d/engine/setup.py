@@ -189,7 +189,7 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
     with blame("sight.method", None):
         method.start(home)
     if sight.people_occlude:
-        units = home.plan.lattice.units_per_m
+        units = home.lattice.units_per_m
         sizes = [round(actor.entity.radius * units) for actor in actors]
         radii = np.maximum(np.array(sizes, np.int64), 1)
     if sight.heights:
@@ -199,7 +199,8 @@ def _open_cameras(basis: Basis) -> tuple[list[Cameras], list[Cameras]]:
     own_method = None if isinstance(method, LineOfSight) else method
     shared = SightSetup(actors, users, own_method, radii, heights)
     cameras = [_cameras_of(row, shared) for row, actor in enumerate(actors) if actor.entity.eyes]
-    return [c for c in cameras if c.row < users], [c for c in cameras if c.row >= users]
+    of_users = [group for group in cameras if group.row < users]
+    return of_users, cameras[len(of_users) :]
 
 
 def _cameras_of(row: int, shared: SightSetup) -> Cameras:
@@ -308,6 +309,7 @@ def _log(
     for each in conversations:
         log.answers = each.log
         log.wanted = each.wanted
-        log.answer_models = {basis.users[u].name: a for u, a in each.answers.items()}
+        models = each.answers.items()
+        log.answer_models = {basis.users[row].name: model for row, model in models}
     log.beliefs = {c.owner.name: c.drift for c in cameras if c.drift is not None}
     return log

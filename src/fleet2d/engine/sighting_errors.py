@@ -175,9 +175,11 @@ class SightingErrors:
             at = looks[is_new] - window.first
             body = poses[0][at], poses[1][at], poses[2][at]
             part[is_new] = self._change(c, part[is_new], looks[is_new], body, memory)
-            rows[here], memory.backlog[c, places] = part[: len(here)], part[len(here) :]
+            rows[here] = part[: len(here)]
+            memory.backlog[c, places] = part[len(here) :]
         is_kept = rows[:, Column.USER] != RETRACTED
-        differs = not is_kept.all() or bool((rows[:, Column.IDENTITY] != identities).any())
+        has_others = bool((rows[:, Column.IDENTITY] != identities).any())
+        differs = has_others or not is_kept.all()
         if differs:
             memory.noticed[:] = before.noticed
             memory.seen[:] = before.seen
@@ -193,14 +195,15 @@ class SightingErrors:
             eye = camera_poses(self._lenses, c, body, looks * self._owner.clock.step_us)
             old = self._sightings(camera.name, rows, looks, eye)
             new = self._with_errors(camera, errors, old)
-            _write(rows, old, new, self._owner.home.plan.lattice)
+            _write(rows, old, new, self._owner.home.lattice)
             missed = rows[~new.noticed & (rows[:, Column.USER] != NOBODY), Column.USER]
             np.subtract.at(memory.about, (c, missed, About.NOTICED.value), 1)
             rows[~new.noticed, Column.USER] = RETRACTED
         if self._drift is not None:
             xy = rows[:, Column.X], rows[:, Column.Y]
+            heading = rows[:, Column.HEADING] + self._drift.at(looks).turn
             rows[:, Column.X], rows[:, Column.Y] = self._drift.misplace(*xy, *body[:2], looks)
-            rows[:, Column.HEADING] = (rows[:, Column.HEADING] + self._drift.at(looks).turn) % TURN
+            rows[:, Column.HEADING] = heading % TURN
         return rows
 
     def _with_errors(
@@ -223,7 +226,7 @@ class SightingErrors:
     def _sightings(self, camera: str, rows: I64, looks: I64, eye: PoseColumns) -> CameraSightings:
         """Return the sightings of some looks of a camera, which is at a place in each."""
         owner = self._owner
-        lattice = owner.home.plan.lattice
+        lattice = owner.home.lattice
         seen = lattice.to_metres(rows[:, [Column.X, Column.Y]])
         true = lattice.to_metres(rows[:, [Column.TRUE_X, Column.TRUE_Y]])
         at = lattice.to_metres(np.stack(eye[:2], axis=1))
@@ -254,7 +257,8 @@ class SightingErrors:
 def _write(rows: I64, old: CameraSightings, new: CameraSightings, lattice: Lattice) -> None:
     """Write the values that errors changed to sightings, in place and rounded."""
     if new.x is not old.x or new.y is not old.y:
-        rows[:, [Column.X, Column.Y]] = lattice.to_lattice(np.stack([new.x, new.y], axis=1))
+        places = np.stack([new.x, new.y], axis=1)
+        rows[:, [Column.X, Column.Y]] = lattice.to_lattice(places)
     if new.heading is not old.heading:
         heading = np.rint(new.heading * (TURN / (2 * math.pi)))
         rows[:, Column.HEADING] = heading.astype(np.int64) % TURN

@@ -272,7 +272,7 @@ class KeyFrames:
         entity, kind, step = np.repeat(numbers, counts, axis=0).T
         step = np.where(step < 0, -(-time // self._clock.step_us), step)
         order = np.lexsort((entity, step))
-        xy = self._home.plan.lattice.to_metres(np.column_stack([x, y])[order])
+        xy = self._home.lattice.to_metres(np.column_stack([x, y])[order])
         away_text = "not at home: x and y are where it left"
         return {
             STEP: step[order],

@@ -228,7 +228,7 @@ class Yielding(Watcher):
     def _set_up(self) -> None:
         """Compute the distances between bodies, and move robots that begin in others."""
         actors = self._actors
-        units = actors[0].home.plan.lattice.units_per_m
+        units = actors[0].home.lattice.units_per_m
         radii = np.array([actor.entity.radius for actor in actors])
         touch = radii[self._rows, None] + radii
 
@@ -415,7 +415,8 @@ class Yielding(Watcher):
             if round_it is not None:
                 return [(now, self._noted(now, other, round_it))]
             # For as long as the other one looks ahead: else it never has the time to get away.
-            return [(now, self._blocked(now, at, other, self._stop(now, self._ahead)))]
+            stop = self._stop(now, self._ahead)
+            return [(now, self._blocked(now, at, other, stop))]
         stays = self._hit_at_rest(now, self._everybody[row])
         if stays is None:
             plan = self._by_waiting(now, at, other)
@@ -448,7 +449,8 @@ class Yielding(Watcher):
         if is_hit:
             return self._overlapping(now, pause)
         self._have_patience(now, other, pause)
-        self._pauses[actor.row] = Patience(now.step + pause, self._actors[other].planned_at, other)
+        planned_at = self._actors[other].planned_at
+        self._pauses[actor.row] = Patience(now.step + pause, planned_at, other)
         plan = self._blocked(now, at, other, self._stop(now, pause))
         if actor.row in self._waits:
             self._waits[actor.row] = self._waits[actor.row]._replace(pause=pause)
@@ -506,7 +508,7 @@ class Yielding(Watcher):
         Where nothing lets it come back, it waits for as long as is known, and then looks again.
         """
         actor = self._actors[now.actor.row]
-        cell = actor.home.plan.lattice.cell
+        cell = actor.home.lattice.cell
         aside = AsideSearch(
             part_of_cell=actor.space.part_of_cell,
             part=actor.part,
@@ -763,4 +765,4 @@ def _goes_somewhere(actor: DecidingActor) -> bool:
     if not isinstance(motion, Track):
         return True
     track = motion.breakpoints
-    return bool((track.x != track.x[0]).any() or (track.y != track.y[0]).any())
+    return bool(np.ptp(track.x) or np.ptp(track.y))

@@ -295,7 +295,7 @@ class Situation:
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
         """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
         actor = self.actor
-        lattice = self.home.plan.lattice
+        lattice = self.home.lattice
         at_x, at_y = lattice.point_at((x, y))
         if actor.space.part_at(at_x, at_y) != actor.part:
             near = actor.space.nearest(at_x, at_y, actor.part)
@@ -585,7 +585,7 @@ class Actor(Body):
         if away:
             x, y = self.way_out
         elif is_point(place):
-            x, y = self.home.plan.lattice.point_at(place)  # type: ignore[arg-type]
+            x, y = self.home.lattice.point_at(place)  # type: ignore[arg-type]
             self.part = max(self.space.part_at(x, y), 0)
             x, y = self.point(place)  # type: ignore[arg-type]
         else:

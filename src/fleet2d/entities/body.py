@@ -354,7 +354,7 @@ class Body:
     notes: list[str] = field(init=False, default_factory=list)
 
     def __post_init__(self) -> None:
-        lattice = self.home.plan.lattice
+        lattice = self.home.lattice
         self.rules = self.entity.keep_out_rules(self)
         self.forbidden = frozenset[int]() if self.rules is None else self.rules.always
         self.kept_out = self.forbidden
@@ -491,7 +491,7 @@ class Body:
         if known is not None and (isinstance(thing, str) or known.thing is thing):
             return known
         home = self.home
-        lattice = home.plan.lattice
+        lattice = home.lattice
         thing = home.object(thing) if isinstance(thing, str) else thing
         if not thing.uses:
             raise PlacementError(f"{self.path}: {thing.name} has no place to use it from")
@@ -519,7 +519,7 @@ class Body:
     @property
     def xy(self) -> tuple[float, float]:
         """Where it is [m]."""
-        return self.home.plan.lattice.xy_of(*self.state.position)
+        return self.home.lattice.xy_of(*self.state.position)
 
     def stream(self, purpose: str) -> np.uint64:
         """Return the key of its random stream for a purpose."""
@@ -536,7 +536,7 @@ class Body:
         """
         assert self.drive is not None
         rates = (self.speed, self.turn_rate)
-        units_per_m = self.home.plan.lattice.units_per_m
+        units_per_m = self.home.lattice.units_per_m
         with self._blame_drive():
             rows = breakpoints(self.drive, route, heading, rates, units_per_m)
         rows[:, 0] += begin_us
@@ -544,7 +544,7 @@ class Body:
 
     def seconds(self, metres: F64) -> F64:
         """Return its estimates of the time for ways of some lengths, without turns [s]."""
-        lattice = self.home.plan.lattice
+        lattice = self.home.lattice
         if self.drive is None:
             return metres * lattice.units_per_m / self.speed
         with self._blame_drive():
@@ -603,7 +603,7 @@ class Body:
     def _spot_of(self, cells: I64, draws: Draws) -> LatticePoint:
         """Return the centre of one of some cells (row, column), drawn at random."""
         row, column = cells[draws.below(len(cells))].tolist()
-        return self.home.plan.lattice.cell_centre(row, column)
+        return self.home.lattice.cell_centre(row, column)
 
     def find_anywhere(self, place: Any, time_us: int) -> LatticePoint:
         """Return the lattice point of a place to put the body at; no way has to lead there.
@@ -620,7 +620,7 @@ class Body:
                 if len(cells):
                     return self._spot_of(cells, Draws(self.stream("put"), time_us))
             raise PlacementError(f"{self.path}: its body fits nowhere in {rooms[0].name}")
-        x, y = self.home.plan.lattice.point_at(target)  # type: ignore[arg-type]
+        x, y = self.home.lattice.point_at(target)  # type: ignore[arg-type]
         if space.part_at(x, y) < 0:
             raise self._is_not_free(target, space.nearest(x, y))  # type: ignore[arg-type]
         return x, y
@@ -633,7 +633,7 @@ class Body:
         Raises:
             PlacementError: The room can't be reached.
         """
-        x, y = self.home.plan.lattice.point_at(room.anchor_xy)
+        x, y = self.home.lattice.point_at(room.anchor_xy)
         point = self.space.nearest(x, y, self.part, room.index)
         if point is None:
             raise PlacementError(f"{self.path}: {room.name} can't be reached from where it starts")
@@ -646,7 +646,7 @@ class Body:
             PlacementError: The body can't stand there, or can't get there; the message has the
                 nearest free point.
         """
-        lattice = self.home.plan.lattice
+        lattice = self.home.lattice
         x, y = lattice.point_at(xy)
         part = self.space.part_at(x, y)
         if part == self.part:
@@ -663,7 +663,7 @@ class Body:
     def _is_not_free(self, xy: Point, near: LatticePoint | None, why: str = "") -> PlacementError:
         """Return the error about a point; it names the nearest free one, in few decimals."""
         why = why or f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
-        lattice = self.home.plan.lattice
+        lattice = self.home.lattice
         free = None
         if near is not None:
             free = lattice.to_metres(near).round(2).tolist()
@@ -677,12 +677,18 @@ class Body:
         """Return whether the home has such furniture, or a reachable room of that name or kind."""
         if furniture_of(self, names) is not None:
             return True
-        return any({r.name, r.type, ANY} & set(names) for r in self.reachable_rooms())
+        return _has_named(self.reachable_rooms(), names)
 
     def _start_part(self, names: RoomChoice) -> int:
         """Return the largest connected part with one of these rooms, else the largest part."""
         for part in range(self.space.parts):
-            reachable = [r for r in self.home.rooms if len(self.space.cells(r.index, part))]
-            if {ANY, *(r.name for r in reachable), *(r.type for r in reachable)} & set(names):
+            rooms = self.home.rooms
+            reachable = [room for room in rooms if len(self.space.cells(room.index, part))]
+            if ANY in names or _has_named(reachable, names):
                 return part
         return 0
+
+
+def _has_named(rooms: Iterable[Room], names: RoomChoice | Point) -> bool:
+    """Return whether one of some rooms has one of these names, or is of such a kind."""
+    return any({room.name, room.type, ANY} & set(names) for room in rooms)

@@ -29,7 +29,7 @@ from fleet2d.entities.behavior import (
     holds,
 )
 from fleet2d.entities.body import Pose
-from fleet2d.entities.place import Point, RoomChoice, lies_in
+from fleet2d.entities.place import Point, RoomChoice, lies_in, nearest_room
 from fleet2d.entities.plan import Plan
 from fleet2d.entities.power import EMPTY
 from fleet2d.errors import ComponentError, InputError, NoWayError, PlacementError, blame
@@ -326,11 +326,10 @@ class LeaveRoom:
                 plan.go_to_point(*outside)
             return plan.stay(timedelta(seconds=1))
         allowed = actor.space_without(banned).rooms_of(0)
-        others = [r for r in actor.reachable_rooms() if r.index in allowed - banned]
+        reachable = actor.reachable_rooms()
+        others = [room for room in reachable if room.index in allowed - banned]
         if others:
-            x, y = now.xy
-            near = min(others, key=lambda r: (r.anchor_xy[0] - x) ** 2 + (r.anchor_xy[1] - y) ** 2)
-            plan.go_to([near.name], "withdraw")
+            plan.go_to([nearest_room(others, now.xy).name], "withdraw")
         return plan.stay(timedelta(seconds=1))
 
 

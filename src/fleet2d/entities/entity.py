@@ -239,11 +239,11 @@ class Robot(Entity):
             raise problem_at(
                 ("perceives",), "it needs a camera, from whose view follows what it watched"
             )
-        own = {"perception": self.perception is not None}
+        if self.perceives.besides_cameras:
+            return
         for key in ("perception", "fails"):
-            own[key] = own.get(key, False) or any(getattr(c, key) for c in self.eyes.values())
-        for key in (key for key, is_given in own.items() if is_given):
-            if not self.perceives.besides_cameras:
+            owners = (self, *self.eyes.values())
+            if any(getattr(owner, key, None) is not None for owner in owners):
                 raise problem_at(
                     ("perceives",),
                     f"give 'perceives' or '{key}', not both, or perceives.besides_cameras: true",

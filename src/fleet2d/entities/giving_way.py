@@ -236,7 +236,7 @@ class WaitForPeople:
             distance: The gap to keep where there is room [m].
         """
         actor = now.actor
-        lattice = actor.home.plan.lattice
+        lattice = actor.home.lattice
         for gap in (max(distance, PASSING_GAP_M) + lattice.cell, PASSING_GAP_M):
             around = people + np.array([0, 0, int(gap * lattice.units_per_m)], np.int64)
             plan = self._stand_for_a_step(now)
@@ -280,7 +280,7 @@ class RoutesAround:
     @cached_property
     def cost(self) -> I32:
         """int32 (rows, columns), CLOSED near them."""
-        xs, ys = self._body.home.plan.lattice.centre_axes()
+        xs, ys = self._body.home.lattice.centre_axes()
         cost = np.zeros(self._body.space.part_of_cell.shape, np.int32)
         for x, y, reach in self.people.tolist():
             rows = _cells_between(y - reach, y + reach)

@@ -102,12 +102,10 @@ def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
     if exact:
         return exact
     rooms = {room.name: room.index for room in plan.rooms}
-    pairs = {
-        tuple(sorted((rooms[a], rooms[b]))) for a in rooms for b in rooms if f"{a}-{b}" == name
-    }
     if name in rooms:
-        return [d for d in plan.doorways if rooms[name] in d.rooms]
-    return [d for d in plan.doorways if tuple(sorted(d.rooms)) in pairs]
+        return [doorway for doorway in plan.doorways if rooms[name] in doorway.rooms]
+    pairs = [{rooms[a], rooms[b]} for a in rooms for b in rooms if f"{a}-{b}" == name]
+    return [doorway for doorway in plan.doorways if set(doorway.rooms) in pairs]
 
 
 def door_hint(plan: FloorPlan, name: str) -> str:
@@ -124,5 +122,6 @@ def door_hint(plan: FloorPlan, name: str) -> str:
 
 
 def _squared(doorway: Doorway, x: float, y: float) -> float:
-    (x0, y0), (x1, y1) = doorway.start, doorway.end
+    x0, y0 = doorway.start
+    x1, y1 = doorway.end
     return float(((x0 + x1) / 2 - x) ** 2 + ((y0 + y1) / 2 - y) ** 2)

@@ -234,7 +234,7 @@ def _gets_to(body: "Body", thing: PlacedObject) -> bool:
         return False
     x, y = body.place_at(thing, 0).approach
     use = thing.uses[0]
-    lattice = body.home.plan.lattice
+    lattice = body.home.lattice
     at_x, at_y = lattice.point_at(use.approach or use.at)
     # Within a metre, if the place itself is too tight: not from another room behind a wall.
     return (x - at_x) ** 2 + (y - at_y) ** 2 <= lattice.units_per_m**2
@@ -324,6 +324,16 @@ def is_kind(body: "Body", place: RoomChoice | Point) -> bool:
     return True
 
 
+def nearest_room(rooms: Iterable[Room], point: Point) -> Room:
+    """Return the room whose middle is nearest to a point [m], in a straight line."""
+
+    def squared_distance(room: Room) -> float:
+        x, y = room.anchor_xy
+        return (x - point[0]) ** 2 + (y - point[1]) ** 2
+
+    return min(rooms, key=squared_distance)
+
+
 def points_at_distance(
     body: "Body", center: LatticePoint, distance: int, directions: int
 ) -> Iterator[LatticePoint]:
@@ -351,7 +361,7 @@ class Nearest:
 
     def __init__(self, body: "Body", room: int | None = None) -> None:
         rows, columns = body.space.cells(room, body.part).T
-        xs, ys = body.home.plan.lattice.centre_axes()
+        xs, ys = body.home.lattice.centre_axes()
         self.centres: I64 = np.stack([xs[columns], ys[rows]], 1)
 
     @cached_property

@@ -148,7 +148,7 @@ class Plan:
         if route is None:
             route = space.route(self.position, (x, y))
         if route is None:
-            at = body.home.plan.lattice.to_metres([x, y]).round(2).tolist()
+            at = body.home.lattice.to_metres([x, y]).round(2).tolist()
             raise NoWayError(f"{body.path}: there is no way to {at} for a body of its radius")
         self._walk(route)
         return self
@@ -320,7 +320,7 @@ class Plan:
 
     def face_place(self, place: Point) -> Self:
         """Turn on the spot towards a place [m]."""
-        return self.face(*self.body.home.plan.lattice.point_at(place))
+        return self.face(*self.body.home.lattice.point_at(place))
 
     def _turn(self, headings: int) -> Self:
         self._check_goes_on()

@@ -104,19 +104,19 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         ]
         if not self.relative:
             used &= self._inside(xy, used, actor, notes)
-        for name, row in (("nobody known", NOBODY), *((u, i) for i, u in enumerate(users))):
-            if count := int((identity[used] == row).sum()):
+        for number, name in enumerate(["nobody known", *users], NOBODY):
+            if count := int((identity[used] == number).sum()):
                 notes.append(f"{count} detections of {name}")
         self.notes = tuple(notes)
         rows = np.zeros((int(used.sum()), SIGHTING), np.int64)  # by camera 0, standing
-        units = actor.home.plan.lattice
+        lattice = actor.home.lattice
         places = np.clip(xy[used], -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
-        points = (
-            np.rint(places * units.units_per_m).astype(np.int64)
-            if self.relative
-            else units.to_lattice(places)
-        )
-        heading = np.floor(np.nan_to_num(turns[used]) * TURN + 0.5).astype(np.int64) % TURN
+        if self.relative:
+            points = np.rint(places * lattice.units_per_m).astype(np.int64)
+        else:
+            points = lattice.to_lattice(places)
+        turned = np.nan_to_num(turns[used])
+        heading = np.floor(turned * TURN + 0.5).astype(np.int64) % TURN
         rows[:, Column.STEP] = step[used]
         rows[:, Column.IDENTITY] = identity[used]
         rows[:, Column.USER] = UNKNOWN_TRUTH
@@ -132,7 +132,7 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         """
         free = actor.home.plan.free_space
         shapely.prepare(free)
-        off = np.flatnonzero(used & ~shapely.contains_xy(free, xy[:, 0], xy[:, 1]))
+        off = np.flatnonzero(used & ~shapely.contains_xy(free, xy))
         metres: F64 = np.atleast_1d(shapely.distance(free, shapely.points(xy[off])))
         far = metres > self.reach
         is_inside = np.ones(len(xy), bool)

@@ -69,7 +69,7 @@ class OccupancySensor(FurnitureSensor):
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps in which the middle of a person is over the object."""
-        lattice = home.plan.lattice
+        lattice = home.lattice
         footprint = home.object(self.of).footprint
         low_x, low_y, high_x, high_y = footprint.bounds
         x0, y0 = lattice.point_at((low_x, low_y))
@@ -109,7 +109,7 @@ class SmartPlug(FurnitureSensor):
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
         """Return the steps in which a person stays at one of the object's places."""
-        lattice = home.plan.lattice
+        lattice = home.lattice
         people = slice(view.users)
         x = view.x[people]
         y = view.y[people]
@@ -150,8 +150,8 @@ class MotionSensor(Sensor):
             raise PlacementError(
                 f"({self.at[0]:g}, {self.at[1]:g}) m is outside the home: hang the sensor in a room"
             )
-        self.eye = home.plan.lattice.point_at(self.at)
-        self.reach = round(self.range * home.plan.lattice.units_per_m)
+        self.eye = home.lattice.point_at(self.at)
+        self.reach = round(self.range * home.lattice.units_per_m)
         self.version = -1
 
     def place(self, home: Home) -> str:

@@ -122,7 +122,7 @@ class Steering:
         return progress if at_us == time_us else Progress(progress.velocity)
 
     def _way(self, body: Body, plan: Plan) -> I64:
-        units = body.home.plan.lattice.units_per_m
+        units = body.home.lattice.units_per_m
         wanted = self.velocity.within_limits(body)
         x, y, heading = (
             FINE * at + rest

@@ -49,6 +49,7 @@ class Home:
 
     Attributes:
         plan: The floor plan, which never changes.
+        lattice: The lattice of the plan.
         doors: The doorways that have a door, by the number of the door.
         rooms: The rooms by index, with their present types.
         objects: The objects at their present places.
@@ -66,6 +67,7 @@ class Home:
 
     def __init__(self, plan: FloorPlan, doors: Sequence[Doorway] = ()) -> None:
         self.plan = plan
+        self.lattice = plan.lattice
         self.doors = tuple(doors)
         self.rooms: tuple[Room, ...] = plan.rooms
         self.objects: tuple[PlacedObject, ...] = plan.objects
@@ -87,7 +89,9 @@ class Home:
     @property
     def constants(self) -> dict[str, object]:
         """The parts of it that never change during a run, by name."""
-        return {"plan": self.plan, "walls": self.plan.sight_mesh, "shapes": self._shapes}
+        plan = self.plan
+        shapes = self._shapes
+        return {"plan": plan, "lattice": self.lattice, "walls": plan.sight_mesh, "shapes": shapes}
 
     def cached(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return the value of a key, which all runs in this home share.

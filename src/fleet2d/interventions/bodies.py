@@ -54,7 +54,7 @@ class BodyIntervention(Intervention):
         actor = self.actor(world)
         home = actor.home
         if is_point(place):
-            x, y = home.plan.lattice.to_lattice(place).tolist()
+            x, y = home.lattice.to_lattice(place).tolist()
             if not home.may_block_routes or actor.space.part_at(x, y) < 0:
                 actor.point(place)  # type: ignore[arg-type]
         elif home.may_block_routes:
@@ -96,7 +96,7 @@ class Put(BodyIntervention):
         actor = self.actor(world)
         x, y = self._place(actor, world)
         if actor.whole_space.part_at(x, y) < 0:
-            x_m, y_m = actor.home.plan.lattice.to_metres((x, y)).round(2).tolist()
+            x_m, y_m = actor.home.lattice.to_metres((x, y)).round(2).tolist()
             raise PlacementError(
                 f"{actor.path}: there is no room for its body at ({x_m:g}, {y_m:g}) m"
             )

@@ -48,7 +48,7 @@ class Steer(RobotIntervention):
 
 def _bodies_near(actor: DecidingActor, world: World) -> list[Disc]:
     """Return where the robot would touch the other bodies that are at home."""
-    units = actor.home.plan.lattice.units_per_m
+    units = actor.home.lattice.units_per_m
     discs = []
     for other in (*world.users.values(), *world.robots.values()):
         if other is not actor and not other.state.away:

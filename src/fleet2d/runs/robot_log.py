@@ -200,11 +200,12 @@ def moves_of(run: Run, name: str, first: int, end: int) -> Iterator[Move]:
         legs = np.hypot(np.diff(way.x), np.diff(way.y))
         is_moving = (legs > 0) | (np.diff(way.heading) != 0)
         edges: I64 = np.flatnonzero(np.diff(is_moving, prepend=False, append=False))
-        for i, j in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for i, j in edges.reshape(-1, 2).tolist():
+            metres = float(legs[i:j].sum())
             places = rooms[way.room[i]], rooms[way.room[j]]
-            move = Move(begin + i, begin + j, float(legs[i:j].sum()), *places)
+            move = Move(begin + i, begin + j, metres, *places)
             if last is not None and last.end == move.first:
-                metres = last.metres + move.metres
+                metres += last.metres
                 last = last._replace(end=move.end, metres=metres, ends_in=move.ends_in)
                 continue
             if last is not None and last.metres >= LEAST_MOVE_M:

@@ -107,9 +107,9 @@ class PathReader:
             )
         with _damage():
             self._keys = _keys_of(run, plan, entity)
-            step = self._keys["step"].tolist()
-            ends = [*step, self.clock.steps]
-            self._segments = [(i, j, step[i], ends[j]) for i, j in _segments(self._keys["kind"])]
+            edges = [*self._keys["step"].tolist(), self.clock.steps]
+            segments = _segments(self._keys["kind"])
+            self._segments = [(begin, end, edges[begin], edges[end]) for begin, end in segments]
         self._walker: tuple[Home, Actor, Meander] | None = None
 
     def read(self, first: int, end: int, every: timedelta) -> Trajectory:
@@ -232,6 +232,7 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     numbers = {name: number for number, name in enumerate(KEY_KINDS)}
     kind = np.array([numbers[name] for name in column["kind"].tolist()], np.int64)
     xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
+    headings = np.rint(column["heading"] * (TURN / (2 * np.pi)))
     start_us = int(run.clock.stamp(0).astype(np.int64))
     return {
         "step": column["step"],
@@ -239,7 +240,7 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
         "kind": kind,
         "x": np.ascontiguousarray(xy[:, 0]),
         "y": np.ascontiguousarray(xy[:, 1]),
-        "heading": np.rint(column["heading"] * (TURN / (2 * np.pi))).astype(np.int64) % TURN,
+        "heading": headings.astype(np.int64) % TURN,
         "away": column["away"].astype(np.uint8),
     }
 

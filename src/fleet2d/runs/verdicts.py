@@ -58,8 +58,10 @@ def verdicts_of(run: "Run") -> list[ExpectationVerdict]:
     verdicts = []
     for name, record in records.items():
         outcome = _outcome(record)
-        first = violations.get(name, [(int(record.get("first", 0)), 0)])[0][0]
-        step = first if outcome == "violated" else None
+        step = None
+        if outcome == "violated":
+            first_steps = [begin for begin, _ in violations.get(name, ())]
+            step = first_steps[0] if first_steps else int(record.get("first", 0))
         verdicts.append(ExpectationVerdict(name, outcome, str(record.get("says") or name), step))
     return sorted(verdicts, key=lambda v: (v.step is None, v.step or 0))
 

@@ -209,8 +209,9 @@ class Sun:
             times: Local times, datetime64[us] (n,).
         """
         days, which = np.unique(times.astype("M8[D]"), return_inverse=True)
-        ends = [map(wall_us, self.day(day.toordinal())) for day in days.tolist()]
-        rise, fall = np.array([*map(list, ends)], np.int64).astype("M8[us]").reshape(-1, 2).T
+        ends = [self.day(day.toordinal()) for day in days.tolist()]
+        ends_us = [(wall_us(rise), wall_us(fall)) for rise, fall in ends]
+        rise, fall = np.array(ends_us, np.int64).astype("M8[us]").reshape(-1, 2).T
         twilight = np.timedelta64(TWILIGHT)
         risen = (times - rise[which] + twilight) / (2 * twilight)
         left = (fall[which] - times + twilight) / (2 * twilight)
@@ -255,4 +256,5 @@ def _sun_on(ordinal: int, latitude: int) -> tuple[int, int]:
 
 def _sine(angle: int) -> int:
     """Return UNIT times the sine of an angle [10**-7 degrees]."""
-    return int(half_sines()[(angle * 2 * TURN + CIRCLE // 2) // CIRCLE % (2 * TURN)])
+    halves = (angle * 2 * TURN + CIRCLE // 2) // CIRCLE
+    return int(half_sines()[halves % (2 * TURN)])

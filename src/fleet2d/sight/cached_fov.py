@@ -71,7 +71,7 @@ class VisibilityPolygon(FieldOfView):
             self.start(home)
         row = y // SUB
         column = x // SUB
-        if self._regions is not None and (x, y) == home.plan.lattice.cell_centre(row, column):
+        if self._regions is not None and (x, y) == home.lattice.cell_centre(row, column):
             pieces = self._regions.of_cell(row, column)
             if pieces is not None:
                 return pieces
@@ -91,7 +91,7 @@ class VisibilityPolygon(FieldOfView):
 
 
 def _regions_of(home: Home) -> Regions:
-    lattice = home.plan.lattice
+    lattice = home.lattice
     triangles = kernels.rasterize_cells(home.walls, lattice.rows, lattice.columns)
     cells = np.ascontiguousarray(np.argwhere(triangles >= 0))
     start, right, wall = kernels.regions_of_cells(home.walls, cells, triangles)
@@ -140,7 +140,7 @@ class Flashlight(FieldOfView):
     def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells are in view: bool (rows, columns)."""
         cells = self._lookup(home, x, y, heading, reach)
-        lattice = home.plan.lattice
+        lattice = home.lattice
         mask = np.zeros((lattice.rows, lattice.columns), np.bool_)
         box = np.unpackbits(cells.bits, count=cells.rows * cells.columns)
         rows = slice(cells.row, cells.row + cells.rows)
@@ -182,7 +182,7 @@ def _pack(mask: Bool) -> CellBits:
 
 def filled_cells(home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
     """Return the cells in view by filling the visible region: bool (rows, columns)."""
-    lattice = home.plan.lattice
+    lattice = home.lattice
     grid = (lattice.rows, lattice.columns)
     mask = np.zeros(grid, np.bool_)
     spans = kernels.cells_in_view(home.walls, x, y, heading, reach, *grid)

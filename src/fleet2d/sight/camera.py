@@ -1,6 +1,6 @@
 """Cameras of robots: settings, errors and disturbances, also in the integers of the core."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from decimal import Decimal
@@ -450,10 +450,10 @@ class Disturbance:
         return self.camera in (None, camera)
 
 
-def dark_cameras(names: Iterable[str], disturbances: Iterable[Disturbance]) -> set[str]:
+def dark_cameras(names: Collection[str], disturbances: Iterable[Disturbance]) -> set[str]:
     """Return those of some cameras that see nothing at all because of disturbances."""
-    darkness = [disturbance for disturbance in disturbances if disturbance.dark]
-    return {name for name in names if any(each.is_of(name) for each in darkness)}
+    darkness = (disturbance for disturbance in disturbances if disturbance.dark)
+    return {name for each in darkness for name in names if each.is_of(name)}
 
 
 class SightSettings(Settings):

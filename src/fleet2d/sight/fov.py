@@ -109,14 +109,14 @@ class FieldOfView(Component):
     """Base of the methods that decide what is in view; a subclass writes `visible`.
 
     Positions are lattice points, headings 1/4096 of a turn counter-clockwise from +x (see
-    ``home.plan.lattice``), so that results can be exact. A method may cache results, but a result
+    ``home.lattice``), so that results can be exact. A method may cache results, but a result
     must depend only on its arguments and on the present walls, ``home.walls``.
 
     Example:
         >>> import fleet2d
         >>> from fleet2d.sight.fov import LineOfSight
         >>> home = fleet2d.Home(fleet2d.load_floorplan())
-        >>> x, y = home.plan.lattice.to_lattice(home.rooms[0].anchor_xy).tolist()
+        >>> x, y = home.lattice.to_lattice(home.rooms[0].anchor_xy).tolist()
         >>> reach = Reach(near_squared=0, far_squared=5000**2, half_angle=1024)
         >>> LineOfSight().sees(home, x, y, 0, reach, np.array([[x + 9, y], [x - 9, y]])).tolist()
         [True, False]
@@ -162,10 +162,11 @@ class FieldOfView(Component):
 
     def cells(self, home: Home, x: int, y: int, heading: int, reach: Reach) -> Bool:
         """Return which cells have their centre in view: bool (rows, columns)."""
-        lattice = home.plan.lattice
+        lattice = home.lattice
         rows, columns = np.indices((lattice.rows, lattice.columns))
-        centres = np.stack([columns.ravel(), rows.ravel()], axis=1) * SUB + CELL_CENTRE
-        return self.sees(home, x, y, heading, reach, centres.astype(np.int64)).reshape(rows.shape)
+        cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
+        centres = (cells * SUB + CELL_CENTRE).astype(np.int64)
+        return self.sees(home, x, y, heading, reach, centres).reshape(rows.shape)
 
 
 class LineOfSight(FieldOfView):

@@ -103,7 +103,8 @@ class Curve(Settings):
 
     def chances(self, x: Sequence[float]) -> I64:
         """Return the probabilities at many x [2**-31]: int64 (n,)."""
-        return np.rint(self._shares(np.array(x, np.float64)) * ONE).astype(np.int64)
+        shares = self._shares(np.array(x, np.float64))
+        return np.rint(shares * ONE).astype(np.int64)
 
     def _shares(self, at: F64) -> F64:
         """Return the probabilities at many x, the same on every machine: float64 (n,)."""

@@ -110,7 +110,7 @@ class Viewpoints(NamedTuple):
 def sight_range(actor: Actor) -> float:
     """Return how far the cameras of a body see [lattice]; 0 without a camera."""
     ranges = [camera.range[1] for camera in actor.entity.eyes.values()]
-    return max(ranges, default=0.0) * actor.home.plan.lattice.units_per_m
+    return max(ranges, default=0.0) * actor.home.lattice.units_per_m
 
 
 def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoints:
@@ -298,7 +298,7 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         if it is near enough already or there is no way.
     """
     actor = now.actor
-    lattice = now.home.plan.lattice
+    lattice = now.home.lattice
     position = actor.state.position
     person = lattice.point_at((x, y))
     goal = lattice.point_at(now.nearest_free(x, y))
@@ -334,7 +334,7 @@ def spot_back(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     """
     actor = now.actor
     home = now.home
-    lattice = home.plan.lattice
+    lattice = home.lattice
     position = actor.state.position
     person = lattice.point_at((x, y))
     reach = math.ceil(distance * lattice.units_per_m)

@@ -97,7 +97,7 @@ class Explore(Behavior):
             return plan.note(EventKind.EXPLORED, percent).stay(timedelta(microseconds=1))
         plan.note(EventKind.EXPLORES, percent)
         row, column = self.stands[self.stand].tolist()
-        plan.go_to_point(*now.home.plan.lattice.cell_centre(row, column))
+        plan.go_to_point(*now.home.lattice.cell_centre(row, column))
         self.plan = plan.turn_by(1.0)
         return plan
 
@@ -128,7 +128,7 @@ class Explore(Behavior):
         is_beside = squared_distance(~(explored & self.floor)) <= 2  # across a side or a corner
         frontier = self.floor & ~explored & is_beside
         away = squared_distance(~frontier)
-        cells = self.reach / now.home.plan.lattice.cell
+        cells = self.reach / now.home.lattice.cell
         row, column = self.stands.T
         near: Bool = away[row, column] <= cells * cells
         near[sorted(self.blocked_stands)] = False

@@ -319,7 +319,7 @@ class Find(BeliefBehavior):
         if self.policy == "receding" or not route:
             problem = self.sites.problem(now, after_empty_looks(prior, age, memory))
             route = tuple(order_by(self.policy, problem, now.random("order")))
-        while route and (route[0] in search.blocked or not self.sites.can_go(plan, route[0])):
+        while route and not self._can_go(plan, search, route[0]):
             route = route[1:]
         search.route = route
         search.goal = route[0] if route else None
@@ -330,10 +330,14 @@ class Find(BeliefBehavior):
         self.plan = plan.ask_by(ends)
         return plan
 
+    def _can_go(self, plan: Plan, search: SearchState, site: int) -> bool:
+        return site not in search.blocked and self.sites.can_go(plan, site)
+
     def _prior(self, now: Situation, user: str) -> tuple[F64, float]:
         """Return the probability of each site, and that of being out, disregarding all looks."""
         belief = self.belief(now, user)
-        sizes = np.array([now.home.plan.rooms[room].cells for room in self.sites.rooms.tolist()])
+        rooms = now.home.plan.rooms
+        sizes = np.array([rooms[room].cells for room in self.sites.rooms.tolist()])
         shares = belief.share[self.sites.rooms]
         total = sum_in_order(shares.tolist())
         shares = shares / total if total > 0 else np.zeros(len(sizes))
@@ -357,6 +361,7 @@ class Find(BeliefBehavior):
         if not self.at:
             return None
         midnight = midnight_of(after)
-        times = sorted(midnight + i * DAY + at for i in range(2) for at in self.at)
+        days = (midnight, midnight + DAY)
+        times = sorted(day + at for day in days for at in self.at)
         moments = (at_reading(start, time) for time in times)
         return next(moment for moment in moments if moment > after)

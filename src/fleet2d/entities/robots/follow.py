@@ -76,7 +76,8 @@ class Follow(Behavior):
         """Follow the person, look where the person was lost, or leave it to later behaviors."""
         in_view = now.in_view
         if self.person is None:
-            self.person = min((n for n in in_view if self.user in ("", n)), default=None)
+            wanted = [name for name in in_view if self.user in ("", name)]
+            self.person = min(wanted, default=None)
             if self.person is None:
                 return None
             self.since = now.time
@@ -153,7 +154,8 @@ class Come(Behavior):
         if command is None:
             return None
         goal = self._outside(now.actor, stop_at(now.actor, command.place))
-        plan = now.plan().go_to_point(*goal).note(EventKind.VISITS, command.text.partition(" ")[2])
+        _, _, place = command.text.partition(" ")
+        plan = now.plan().go_to_point(*goal).note(EventKind.VISITS, place)
         self.command = None
         return plan.stay(self.stay)
 
@@ -166,5 +168,6 @@ class Come(Behavior):
         metres = actor.space.distances(goal, cells)
         if not np.isfinite(metres).any():
             return goal  # behind a shut door: there is no way at present
-        x, y = cells[np.abs(metres - metres.min() - OFF_DOOR_M).argmin()].tolist()
+        off_m = np.abs(metres - metres.min() - OFF_DOOR_M)
+        x, y = cells[off_m.argmin()].tolist()
         return x, y

@@ -139,10 +139,15 @@ class HangoutPlaces:
         seats = self._seats[room.index]
         if not len(seats):
             return np.zeros(len(self.points))
-        squares = ((self.points[:, None] - seats[None]) ** 2).sum(axis=2)
+        squares = self._squared_distances(seats)
         places, near = np.nonzero(squares <= reach * reach)
         is_seen = pairs_in_sight(walls, self.points[places], seats[near])
         return np.bincount(places[is_seen], minlength=len(self.points)) / len(seats)
+
+    def _squared_distances(self, seats: I64) -> I64:
+        """Return the squared distance of each place from each seat, int64 (n, seats)."""
+        squares: I64 = ((self.points[:, None] - seats) ** 2).sum(axis=2)
+        return squares
 
     def _path(self, room: Room, tau: float) -> F64:
         actor = self._actor
@@ -158,9 +163,9 @@ class HangoutPlaces:
         actor = self._actor
         home = actor.home
         space = home.space(PERSON, opens_doors=True)
-        anchors = home.plan.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
+        anchors = home.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
         stops = [space.nearest(x, y, 0, room) for room, (x, y) in enumerate(anchors)]
-        reach = (PERSON + actor.entity.radius) * home.plan.lattice.units_per_m
+        reach = (PERSON + actor.entity.radius) * home.lattice.units_per_m
         blocked = np.zeros(len(self.points))
         ways = 0
         for start, goal in combinations(filter(None, stops), 2):
@@ -177,7 +182,7 @@ class HangoutPlaces:
         if not uses or not len(self.points):
             return np.zeros(len(self.points))
         seats = plan.lattice.to_lattice(uses)
-        gaps = ((self.points[:, None] - seats[None]) ** 2).sum(axis=2).min(axis=1)
+        gaps = self._squared_distances(seats).min(axis=1)
         metres = np.sqrt(gaps.astype(np.float64)) / plan.lattice.units_per_m
         return np.maximum(0.0, 1 - metres / PERSONAL)
 
@@ -377,6 +382,6 @@ class Hangout(BeliefBehavior):
     def _face_room(self, now: Situation, plan: Plan) -> None:
         """Turn to the middle of the room that it stands in."""
         room = now.home.plan.rooms[int(self.places.room[self.place])]
-        x, y = now.home.plan.lattice.point_at(room.anchor_xy)
+        x, y = now.home.lattice.point_at(room.anchor_xy)
         if (x, y) != plan.position:
             plan.face(x, y)

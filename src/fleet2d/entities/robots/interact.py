@@ -363,7 +363,7 @@ class Interact(BeliefBehavior):
     def _ask(self, now: Situation, request: Request, place: Point) -> Plan:
         """Approach a person in view, address the person, and wait for the answer."""
         self.at_home.note_found(request.to, now.time)
-        x, y = now.home.plan.lattice.point_at(now.nearest_free(*now.xy))
+        x, y = now.home.lattice.point_at(now.nearest_free(*now.xy))
         self.served = ServedRequest(request, "ask", request.text, place, (x, y))
         plan = now.plan()
         approach(now, plan, *place, request.interaction.distance)

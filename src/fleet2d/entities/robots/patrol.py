@@ -278,7 +278,7 @@ class Retrace(Behavior):
             ) from error
         if not pieces:
             raise PlacementError(f"{actor.path}: {self.path} holds no path to retrace")
-        lattice = actor.home.plan.lattice
+        lattice = actor.home.lattice
         points: I64 = lattice.to_lattice(np.concatenate(pieces))
         near: I64 = Nearest(actor).of(points)
         squared_moves = ((near - points) ** 2).sum(axis=1)

@@ -318,7 +318,8 @@ class LearnedBehavior(BeliefBehavior):
                 "the policy has no file: give one, as file: hangout.onnx, derive a class from"
                 f" {type(self).__name__} that overrides act, or use fleet2d.learning.gym"
             )
-        output = compute(self.file, {INPUTS[0]: observation[None], INPUTS[1]: mask[None]})
+        inputs = zip(INPUTS, (observation[None], mask[None]), strict=True)
+        output = compute(self.file, dict(inputs))
         scores = output[0] if output.ndim else output
         if scores.shape != mask.shape:
             raise ComponentError(

@@ -64,13 +64,12 @@ def search_problem(
     chances = np.asarray(prior, np.float64)
     count = len(chances)
     ways = np.asarray(travel, np.float64)
-    problem = SearchProblem(
-        chances,
-        np.asarray(reach, np.float64),
-        ways.reshape(count, count) if ways.size == count * count else ways,
-        np.broadcast_to(np.asarray(look, np.float64), (count,)).copy(),
-        np.broadcast_to(np.asarray(detect, np.float64), (count,)).copy(),
-    )
+    if ways.size == count * count:
+        ways = ways.reshape(count, count)
+    looks = np.broadcast_to(np.asarray(look, np.float64), (count,))
+    detects = np.broadcast_to(np.asarray(detect, np.float64), (count,))
+    reached = np.asarray(reach, np.float64)
+    problem = SearchProblem(chances, reached, ways, looks.copy(), detects.copy())
     shapes = {"reach": (count,), "travel": (count, count)}
     for name, expected in shapes.items():
         shape = getattr(problem, name).shape
@@ -158,9 +157,8 @@ def receding(problem: SearchProblem, horizon: int = HORIZON) -> list[int]:
     rough = greedy(problem)
     sites = sorted(rough[:horizon])
     prior, reach, travel, look, detect = problem
-    part = SearchProblem(
-        prior[sites], reach[sites], travel[np.ix_(sites, sites)], look[sites], detect[sites]
-    )
+    ways = travel[np.ix_(sites, sites)]
+    part = SearchProblem(prior[sites], reach[sites], ways, look[sites], detect[sites])
     return [sites[number] for number in exact(part)] + rough[horizon:]
 
 
@@ -216,7 +214,8 @@ def _step_by_step(problem: SearchProblem, worth: Callable[[float, float], float]
     order = list[int]()
     while remaining:
         ways = problem.travel[order[-1]] if order else problem.reach
-        best = max(remaining, key=lambda j: (worth(float(ways[j]) + look[j], gain[j]), -j))
+        worths = [worth(float(ways[site]) + look[site], gain[site]) for site in remaining]
+        best = remaining[worths.index(max(worths))]
         order.append(best)
         remaining.remove(best)
     return order
@@ -243,7 +242,9 @@ def _solve(ways: F64, reach: F64, gain: F64) -> tuple[I8, int]:
     last = np.arange(count)
     for done in range(count - 1, 0, -1):
         layer = subsets[size == done]
-        ahead = np.where(layer[:, None] & bits, np.inf, cost[layer[:, None] | bits, last])
+        is_done = layer[:, None] & bits
+        after = layer[:, None] | bits
+        ahead = np.where(is_done, np.inf, cost[after, last])
         # Indexed by subset, last site and next site; of equal ones, the first is chosen.
         total = outside[layer][:, None, None] * ways + ahead[:, None, :]
         choice[layer] = total.argmin(axis=2)

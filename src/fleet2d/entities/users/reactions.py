@@ -60,7 +60,7 @@ class Reactions(Behavior):
         # of the present reaction, and the step at which it ends
         self.rank = 0
         self.until = -1
-        units = actor.home.plan.lattice.units_per_m
+        units = actor.home.lattice.units_per_m
         return Attention(
             notices=round(manners.notices * units),
             in_way=round(manners.in_the_way * units),
@@ -145,7 +145,7 @@ class Reactions(Behavior):
         self, now: Situation, center: LatticePoint, distance_m: float
     ) -> list[LatticePoint]:
         """Return free points at a distance [m] from a point, in the same room."""
-        distance = round(distance_m * now.home.plan.lattice.units_per_m)
+        distance = round(distance_m * now.home.lattice.units_per_m)
         return list(points_at_distance(now.actor, center, distance, DIRECTIONS))
 
     def _maybe_stop(self, now: Situation, draws: Draws) -> None:
@@ -155,7 +155,7 @@ class Reactions(Behavior):
 
 
 def _robot(now: Situation, event: SightEvent) -> LatticePoint:
-    return now.home.plan.lattice.point_at((event.x, event.y))
+    return now.home.lattice.point_at((event.x, event.y))
 
 
 def _squared(dx: int, dy: int) -> int:

@@ -81,7 +81,7 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
         turns: Headings in the plan [turns], NaN where there is none.
         reach: A fix farther than this from any such place is left out [m].
     """
-    lattice = actor.home.plan.lattice
+    lattice = actor.home.lattice
     space = actor.space
     size = 1 << 20  # beyond any home, within 64 bits when squared
     clipped = np.clip(xy, -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
@@ -125,7 +125,7 @@ class FixFollower:
         self.fixes = fixes
         self.gap_us = gap_us
         self.gaps = gaps
-        self.fastest = FASTEST_M_S * actor.home.plan.lattice.units_per_m
+        self.fastest = FASTEST_M_S * actor.home.lattice.units_per_m
         self.unknown_us = self.gap_count = self.implausible = self.around = 0
         self.top_speed = 0.0
         self.heading = self._headings()
@@ -167,7 +167,7 @@ class FixFollower:
         """Return the heading at each fix: the log's, else the direction to the next fix."""
         xy = self.fixes.xy
         heading = self.fixes.heading.copy()
-        stir = MIN_HEADING_MOVE_M * self.actor.home.plan.lattice.units_per_m
+        stir = MIN_HEADING_MOVE_M * self.actor.home.lattice.units_per_m
         last = 0
         moves = np.diff(xy, axis=0, append=xy[-1:])
         for i, (dx, dy) in enumerate(moves.tolist()):
@@ -290,7 +290,8 @@ class RoomFollower:
     def _spot(self, visit: LoggedVisit, plan: Plan) -> LatticePoint:
         if visit.place in (DOOR, AWAY):
             return self.actor.way_out
-        return self.actor.find((visit.place,), max(visit.first, 0) * self.step_us, "spot")
+        begin_us = max(visit.first, 0) * self.step_us
+        return self.actor.find((visit.place,), begin_us, "spot")
 
     def _appear(self, plan: Plan, visit: LoggedVisit, at_us: int, *, known: bool = True) -> None:
         """Put the body where the log has it."""
@@ -326,7 +327,8 @@ class RoomFollower:
             return spot
         if room.index not in self._nearest:
             self._nearest[room.index] = Nearest(self.actor, room.index)
-        ((x, y),) = self._nearest[room.index].of(np.array([[plan.x, plan.y]], np.int64)).tolist()
+        here = np.array([plan.position], np.int64)
+        ((x, y),) = self._nearest[room.index].of(here).tolist()
         return x, y
 
     def _way(self, plan: Plan, spot: LatticePoint) -> I64:
@@ -399,7 +401,8 @@ def report_rooms(
     gaps = [visit for visit in logged.visits if visit.place == UNKNOWN]
     steps = follower.actor.clock.steps
     step_us = follower.step_us
-    hours = sum_in_order((min(v.last + 1, steps) - max(v.first, 0)) * step_us / 3.6e9 for v in gaps)
+    lengths = (min(gap.last + 1, steps) - max(gap.first, 0) for gap in gaps)
+    hours = sum_in_order(length * step_us / 3.6e9 for length in lengths)
     if gaps:
         lines.append(f"nobody knows where it is in {len(gaps)} gaps, {hours:.1f} h in all")
     if follower.hurried:
@@ -428,7 +431,7 @@ def report_fixes(
         hours = follower.unknown_us / 3.6e9
         lines.append(f"nobody knows where it is in {follower.gap_count} gaps, {hours:.2f} h in all")
     if follower.implausible:
-        metres = follower.top_speed / follower.actor.home.plan.lattice.units_per_m
+        metres = follower.top_speed / follower.actor.home.lattice.units_per_m
         lines.append(
             f"{follower.implausible} legs are too fast to be true, up to {metres:.1f} m/s: check"
             " the frame and the times"
@@ -532,7 +535,8 @@ class Replay(Behavior, LogKeys):
                 plan.note(EventKind.REPLAY, note)
         if isinstance(self.follower, FixFollower):
             return self.follower.follow(plan)
-        current = max((i for i, v in enumerate(self.visits) if v.first <= now.step), default=0)
+        begun = [i for i, visit in enumerate(self.visits) if visit.first <= now.step]
+        current = max(begun, default=0)
         return self.follower.follow(plan, current, rejoin=now.step > 0)
 
     def _start_rooms(self, actor: Actor, log: ActivityLog, begin_us: int) -> None:
@@ -564,7 +568,8 @@ class Replay(Behavior, LogKeys):
         time_us = log.time_us - begin_us
         step = time_us // clock.step_us
         # The first fix of each step of the run.
-        used = np.append(True, step[1:] != step[:-1]) & (time_us < clock.steps * clock.step_us)
+        is_first = np.append(True, step[1:] != step[:-1])
+        used = is_first & (time_us < clock.steps * clock.step_us)
         fixes = place_fixes(
             actor,
             time_us[used],

@@ -12,7 +12,7 @@ import numpy as np
 
 from fleet2d import kernels
 from fleet2d.entities.behavior import Actor, Behavior, Situation
-from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms
+from fleet2d.entities.place import RoomChoice, is_kind, matching_rooms, nearest_room
 from fleet2d.entities.plan import Plan, PlanEnd, new_note
 from fleet2d.errors import PlacementError
 from fleet2d.floorplan.home import Home
@@ -97,13 +97,7 @@ class Spots:
 
     def nearest(self, rooms: list[Room], x: int, y: int) -> Room:
         """Return the room whose middle is nearest to a lattice point, in a straight line."""
-        at_x, at_y = self._actor.home.plan.lattice.xy_of(x, y)
-
-        def squared_distance(room: Room) -> float:
-            middle_x, middle_y = room.anchor_xy
-            return (middle_x - at_x) ** 2 + (middle_y - at_y) ** 2
-
-        return min(rooms, key=squared_distance)
+        return nearest_room(rooms, self._actor.home.lattice.xy_of(x, y))
 
     def in_room(self, room: Room) -> list[Spot]:
         """Return the body's habitual spots of a room as it is at present, at least one."""
@@ -162,7 +156,7 @@ class Spots:
     def _grid(self, room: Room) -> tuple[Spot, ...]:
         """Return the spots of a room: a grid of cells, a finer one in a small room."""
         actor = self._actor
-        lattice = actor.home.plan.lattice
+        lattice = actor.home.lattice
         cells = actor.space.cells(room.index, actor.part)
         pitch = math.ceil(SPACING / lattice.cell)
         while pitch:
@@ -363,7 +357,7 @@ class KnownHome:
 
     def _make_core_venue(self, name: str, venue: Venue) -> CoreVenue:
         activity = venue.activity
-        waits = exponential_waits
+        moves = venue.small_moves
         return CoreVenue(
             venue,
             self._names.setdefault(name, len(self._names)),
@@ -373,7 +367,7 @@ class KnownHome:
             [room.index for room in venue.rooms],
             self._numbers_of(venue.seats),
             [room.index for room in venue.stores],
-            [(MOVE_KINDS.index(kind), waits(mean_s)) for kind, mean_s in venue.small_moves],
+            [(MOVE_KINDS.index(kind), exponential_waits(mean_s)) for kind, mean_s in moves],
             venue.fetch_takes,
         )
 

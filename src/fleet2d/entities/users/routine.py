@@ -184,7 +184,8 @@ class Seating:
             for number in claim.episodes:
                 places[claim.rank, number] = seat
             if seat is not None:
-                self._taken.setdefault(self._spot[seat], []).append((claim.begin, claim.end))
+                times = self._taken.setdefault(self._spot[seat], [])
+                times.append((claim.begin, claim.end))
         return places
 
     def _is_free(self, seat: Seat, claim: SeatClaim) -> bool:
@@ -234,7 +235,8 @@ class Seating:
     def _seats(self, activity: Activity, rooms: frozenset[int], wanted: int) -> Sequence[Seat]:
         """Return the places for an activity in some rooms, of those at one spot the first."""
         seats = resident.seats_at(self._home, activity, rooms, wanted)
-        return list({self._spot[seat]: seat for seat in reversed(seats)}.values())[::-1]
+        first_at_spot = {self._spot[seat]: seat for seat in reversed(seats)}
+        return list(first_at_spot.values())[::-1]
 
     def _rooms(self, rank: int, activity: Activity, bedroom: int | None) -> Sequence[Room]:
         """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""

@@ -130,7 +130,7 @@ class ProcessBehavior(Behavior):
     def decide(self, now: Situation) -> Plan | None:
         """Ask the program."""
         goal = None if self._goal is None else self._goal.outcome(now.actor.state)
-        x, y = now.home.plan.lattice.to_metres([now.actor.state.x, now.actor.state.y]).tolist()
+        x, y = now.xy
         room = now.home.plan.room_at(x, y)
         shares = {
             name: output.share.tolist()
