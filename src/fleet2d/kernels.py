@@ -82,6 +82,11 @@ def in_radians(heading: int | I64) -> Any:
     return heading * (2 * math.pi / TURN)
 
 
+def rounded(values: Any) -> I64:
+    """Return the nearest integers, the even one of two: int64 of the same shape."""
+    return np.rint(values).astype(np.int64)
+
+
 def turned(x: I64, y: I64, angle: I64) -> tuple[I64, I64]:
     """Return points turned about the origin, rounded: x and y.
 

@@ -7,7 +7,7 @@ lights. Changes are made before decisions in a step, so they hold for all bodies
 
 import heapq
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -117,26 +117,29 @@ def crossings(track: Breakpoints, line: Segment, *, jumps: bool = True) -> list[
         line: The segment from jamb to jamb [lattice units].
         jumps: Whether legs that take no time count.
     """
-    (ax, ay), (bx, by) = line
-    x, y = track.x, track.y
-    side = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+    x = track.x
+    y = track.y
+    side = _side_of(line, x, y)
     crosses = (side[:-1] > 0) != (side[1:] > 0)
     if not jumps:
         crosses &= np.diff(track.time) > 0
     times: list[int] = []
     for i in np.flatnonzero(crosses).tolist():
-        px = int(x[i])
-        py = int(y[i])
-        qx = int(x[i + 1])
-        qy = int(y[i + 1])
-        a = (qx - px) * (ay - py) - (qy - py) * (ax - px)
-        b = (qx - px) * (by - py) - (qy - py) * (bx - px)
+        leg = (int(x[i]), int(y[i])), (int(x[i + 1]), int(y[i + 1]))
+        a, b = (_side_of(leg, *jamb) for jamb in line)
         if (a > 0) != (b > 0) or 0 in (a, b):
             near = abs(int(side[i]))
             far = abs(int(side[i + 1]))
-            begin, end = int(track.time[i]), int(track.time[i + 1])
-            times.append(begin + (end - begin) * near // max(near + far, 1))
+            begin = int(track.time[i])
+            lasts = int(track.time[i + 1]) - begin
+            times.append(begin + lasts * near // max(near + far, 1))
     return times
+
+
+def _side_of(line: Segment, x: Any, y: Any) -> Any:
+    """Return on which side of a line points are: above 0 on its left; exact for integers."""
+    (ax, ay), (bx, by) = line
+    return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
 
 def way_ahead(actor: Actor, now_us: int) -> LineString | None:

@@ -162,8 +162,8 @@ class BlockedWays(Watcher):
         others = others[others != row]
         if not len(moves) or not len(others):
             return None
-        reach = self._reach(row, others)[:, None]
         others = others[:, None]
+        reach = self._reach(row, others)
         met = _approach(x, y, row, others, moves, reach)
         met &= (away[others, moves] | away[others, moves + 1]) == 0
         passed = self._passes[row]
@@ -177,7 +177,8 @@ class BlockedWays(Watcher):
     def _reach(self, row: int, others: I64) -> I64:
         """Return the distances at which a body touches others [lattice units], int64 (n,)."""
         units_per_m = self._actors[row].home.lattice.units_per_m
-        return ((self._radii[row] + self._radii[others]) * units_per_m).astype(np.int64)
+        reach_m = self._radii[row] + self._radii[others]
+        return (reach_m * units_per_m).astype(np.int64)
 
 
 def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -> Bool:

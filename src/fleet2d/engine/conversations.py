@@ -351,7 +351,7 @@ class Conversations(Watcher):
             queue.settle(request, reply.outcome, time, time + reply.later)
         self._tell(row, str(reply.outcome), text)
         name, _, person = text.rpartition(" ")
-        user = next(actor.row for actor in self.actors if actor.name == person)
+        user = self._row_of(person)
         events = self._obey(row, user, reply.outcome, text, step, bodies)
         asked = queue.interactions.get(name)
         if reply.outcome != Outcome.ACCEPTED or asked is None or asked.do != "ask":
@@ -418,7 +418,7 @@ class Conversations(Watcher):
         if note is not None:
             time = self._clock.time(step)
             person = note.detail.rpartition(" ")[2]
-            user = next(actor.row for actor in self.actors if actor.name == person)
+            user = self._row_of(person)
             state = self.attitudes[user, row]
             self.answers[user].months.pass_time(state, time)
             self.answers[user].months.let_down(state)
@@ -428,6 +428,9 @@ class Conversations(Watcher):
             events.append(Event(step, robot.name, EventKind.BROKEN_OFF, note.detail))
         self._look_ahead()
         return events
+
+    def _row_of(self, name: str) -> int:
+        return next(actor.row for actor in self.actors if actor.name == name)
 
     def _end_bans(self, step: int) -> list[Event]:
         """End the bans of rooms that are over at a step."""

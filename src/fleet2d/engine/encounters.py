@@ -201,12 +201,14 @@ class Encounters(Watcher):
         if not self.pairs or not count:
             return ()
         block = bodies.block(first, end)
+        happened = [encounter for encounter in self._ahead if encounter.column == count - 1]
         for pair in self.pairs:
-            last = [e for e in self._ahead if e.pair is pair and e.column == count - 1]
-            pair.advance(block, count, [e.event for e in last])
-            x, y = pair.user.home.lattice.to_metres(pair.at).tolist()
-            events = (SightEvent(e.event, e.robot.name, x, y) for e in last)
-            self._last += [(pair.user.row, pair.user, event) for event in events]
+            kinds = [encounter.event for encounter in happened if encounter.pair is pair]
+            pair.advance(block, count, kinds)
+            place = pair.user.home.lattice.xy_of(*pair.at)
+            for kind in kinds:
+                event = SightEvent(kind, pair.robot.name, *place)
+                self._last.append((pair.user.row, pair.user, event))
         return ()
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:

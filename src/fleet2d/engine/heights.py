@@ -11,7 +11,7 @@ from fleet2d.entities.behavior import Actor
 from fleet2d.floorplan.furniture import FURNITURE
 from fleet2d.floorplan.home import Home, lattice_footprint
 from fleet2d.floorplan.placed_objects import PlacedObject
-from fleet2d.kernels import I64, TURN, UNIT, Heights, cosine, in_radians, sine
+from fleet2d.kernels import I64, TURN, UNIT, Heights, cosine, in_radians, rounded, sine
 from fleet2d.sight.camera import Camera
 
 # Where the head, the eyes and a robot's camera are, as a share of the height of a body; and where
@@ -57,9 +57,10 @@ class BodyHeights:
         mounted = [HEAD * own[0] if c.height is None else 1000 * c.height for c in cameras]
         around = islice(cycle(AROUND), points - 1)
         shares = np.array([HEAD, *around])
-        looked_at = np.rint(self.tops[others, :, None] * shares).astype(np.int64)
-        eyes = np.rint(np.outer(mounted, own / own[0])).astype(np.int64)
-        return eyes, np.repeat(looked_at[None], len(mounted), axis=0), self.tops
+        looked_at = rounded(self.tops[others, :, None] * shares)
+        eyes = rounded(np.outer(mounted, own / own[0]))
+        by_camera = np.repeat(looked_at[None], len(mounted), axis=0)
+        return eyes, by_camera, self.tops
 
     def with_furniture(self, levels: tuple[I64, I64, I64], home: Home) -> Heights:
         """Return levels with those of the furniture that is in the home at present."""
@@ -112,8 +113,8 @@ def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
 
 
 def _corners(polygon: shapely.Polygon) -> I64:
-    return np.rint(np.asarray(polygon.exterior.coords)[:-1]).astype(np.int64)
+    return rounded(polygon.exterior.coords[:-1])
 
 
 def _millimetres(metres: np.ndarray) -> I64:
-    return np.rint(1000 * metres).astype(np.int64)
+    return rounded(1000 * metres)

@@ -161,7 +161,10 @@ class LayerBook:
         """Store a layer after a step: its fill value, and the cells with another one."""
         values = layer.values
         fill = np.array(layer.fill)
-        differs = ~np.isnan(values) if np.isnan(fill) else values != fill.astype(values.dtype)
+        if np.isnan(fill):
+            differs = ~np.isnan(values)
+        else:
+            differs = values != fill.astype(values.dtype)
         row, column = np.nonzero(differs)
         kind = KINDS[layer.dtype.kind]
         dtype = DTYPES[kind]

@@ -10,7 +10,7 @@ from fleet2d.engine.sighting_errors import sight_events
 from fleet2d.entities.body import Bodies
 from fleet2d.entities.entity import SIGHTING, EvidenceSource, LiveDetections
 from fleet2d.errors import blame
-from fleet2d.kernels import I64, NOBODY, TURN, UNKNOWN_TRUTH, SightMemory, turned
+from fleet2d.kernels import I64, NOBODY, TURN, UNKNOWN_TRUTH, SightMemory, rounded, turned
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.sight.camera import FalseSighting
 
@@ -47,7 +47,7 @@ class RealSight(Cameras):
         rows = np.zeros((len(sightings), SIGHTING), np.int64)
         places = np.array([(sighting.x, sighting.y) for sighting in sightings])
         if source.relative:
-            points = np.rint(places * lattice.units_per_m).astype(np.int64)
+            points = rounded(places * lattice.units_per_m)
         else:
             points = lattice.to_lattice(places)
         rows[:, Column.STEP] = step
@@ -87,11 +87,12 @@ class RealSight(Cameras):
     def _on_map(self, rows: I64, bodies: Bodies, first: int, end: int) -> I64:
         """Return sightings in the frame of the robot as sightings in the floor plan."""
         rows = rows.copy()
-        x, y, heading, _ = bodies.window(first, end).dense(self.row, first, end)[:4]
+        x, y, heading = bodies.window(first, end).dense(self.row, first, end)[:3]
         at = rows[:, Column.STEP] - first
-        dx, dy = turned(rows[:, Column.X], rows[:, Column.Y], 2 * heading[at])
+        turn = heading[at]
+        dx, dy = turned(rows[:, Column.X], rows[:, Column.Y], 2 * turn)
+        faces: I64 = np.mod(rows[:, Column.HEADING] + turn, TURN)
         rows[:, Column.X] = rows[:, Column.TRUE_X] = x[at] + dx
         rows[:, Column.Y] = rows[:, Column.TRUE_Y] = y[at] + dy
-        faces: I64 = np.mod(rows[:, Column.HEADING] + heading[at], TURN)
         rows[:, Column.HEADING] = rows[:, Column.TRUE_HEADING] = faces
         return rows

@@ -70,7 +70,8 @@ class Samples:
         """Collect the samples of the steps from `first` to `end` - 1."""
         if not self._every or first >= end:
             return
-        steps = np.arange(-(-first // self._every) * self._every, end, self._every)
+        begin = -(-first // self._every) * self._every
+        steps = np.arange(begin, end, self._every)
         rows = np.empty((len(steps), len(bodies), 6), np.int64)
         rows[:, :, 0] = steps[:, None]
         rows[:, :, 1] = np.arange(len(bodies))

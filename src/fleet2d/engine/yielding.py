@@ -696,9 +696,8 @@ class Yielding(Watcher):
 
     def _queues(self, actor: DecidingActor, other: int, step: int, at: int) -> bool:
         """Return whether another body stays at the charger that a robot wants to get to."""
-        return self._is_taken(actor, other, step, at) and self._stop_of(actor, at) == _charger(
-            actor
-        )
+        goes_charging = self._stop_of(actor, at) == _charger(actor)
+        return goes_charging and self._is_taken(actor, other, step, at)
 
     def _rest_of(self, row: int, step: int) -> int:
         """Return for how many steps a body surely stays where it is: a power of two of them."""

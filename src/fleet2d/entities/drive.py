@@ -121,17 +121,21 @@ def breakpoints(
     ends = [0.0]
     legs = []
     for (ax, ay), (bx, by) in pairwise(points.tolist()):
-        dx, dy = bx - ax, by - ay
+        dx = bx - ax
+        dy = by - ay
         if dx or dy:
-            legs.append(Leg(math.sqrt(dx * dx + dy * dy) / units_per_m, heading_of(dx, dy)))
+            length = math.sqrt(dx * dx + dy * dy) / units_per_m
+            legs.append(Leg(length, heading_of(dx, dy)))
             corners.append([bx, by])
-            ends.append(ends[-1] + legs[-1].length)
+            ends.append(ends[-1] + length)
 
     def row(moment: Moment, leg: int) -> tuple[int, ...]:
-        (ax, ay), (bx, by) = corners[leg], corners[leg + 1]
+        ax, ay = corners[leg]
+        bx, by = corners[leg + 1]
         is_at_end = abs(moment.metres - ends[leg + 1]) <= NEAR_M
         share = 1.0 if is_at_end else (moment.metres - ends[leg]) / legs[leg].length
-        x, y = ax + round((bx - ax) * share), ay + round((by - ay) * share)
+        x = ax + round((bx - ax) * share)
+        y = ay + round((by - ay) * share)
         return round(moment.seconds * 1e6), x, y, moment.heading % TURN, 0
 
     rows = []

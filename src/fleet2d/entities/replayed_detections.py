@@ -13,7 +13,7 @@ from fleet2d.configuration.units import InputFileOrFolder, Length
 from fleet2d.entities.behavior import Actor
 from fleet2d.entities.entity import SIGHTING, EvidenceSource
 from fleet2d.errors import errors_as
-from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool
+from fleet2d.kernels import F64, I64, NOBODY, TURN, UNKNOWN_TRUTH, Bool, rounded
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.logs.log import Day, LogError, LogKeys, files_of, in_run
 from fleet2d.logs.placement import COORDINATE_LIMIT_M, MAX_OUTSIDE, LogFrame
@@ -112,7 +112,7 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         lattice = actor.home.lattice
         places = np.clip(xy[used], -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
         if self.relative:
-            points = np.rint(places * lattice.units_per_m).astype(np.int64)
+            points = rounded(places * lattice.units_per_m)
         else:
             points = lattice.to_lattice(places)
         turned = np.nan_to_num(turns[used])

@@ -67,9 +67,11 @@ class Disc(NamedTuple):
 
     def blocks(self, old: tuple[int, int], new: tuple[int, int]) -> bool:
         """Whether a move ends within reach of it, and no farther from it than it begins."""
-        before = (old[0] - self.x) ** 2 + (old[1] - self.y) ** 2
-        after = (new[0] - self.x) ** 2 + (new[1] - self.y) ** 2
-        return after < self.reach**2 and after <= before
+        after = self._squared_distance(*new)
+        return after < self.reach**2 and after <= self._squared_distance(*old)
+
+    def _squared_distance(self, x: int, y: int) -> int:
+        return (x - self.x) ** 2 + (y - self.y) ** 2
 
 
 class Progress(NamedTuple):

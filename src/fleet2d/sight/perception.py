@@ -18,7 +18,7 @@ from fleet2d.configuration.components import CheckNames, NameAsType, OneOf, Sett
 from fleet2d.configuration.problems import problem, problem_at
 from fleet2d.configuration.units import AngleDeg, Duration, Length, Share
 from fleet2d.floorplan.placed_objects import Posture
-from fleet2d.kernels import F64, I64, ONE
+from fleet2d.kernels import F64, I64, ONE, rounded
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.sight.perception_error import PerceptionError
 
@@ -104,7 +104,7 @@ class Curve(Settings):
     def chances(self, x: Sequence[float]) -> I64:
         """Return the probabilities at many x [2**-31]: int64 (n,)."""
         shares = self._shares(np.array(x, np.float64))
-        return np.rint(shares * ONE).astype(np.int64)
+        return rounded(shares * ONE)
 
     def _shares(self, at: F64) -> F64:
         """Return the probabilities at many x, the same on every machine: float64 (n,)."""

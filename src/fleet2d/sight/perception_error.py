@@ -189,7 +189,7 @@ class CameraSightings:
         sines = kernels.half_sines()
         target = np.maximum(0.0, distance * factor + added)
         stretch = target / np.where(distance > 0, distance, 1.0)
-        angle = np.rint(turns).astype(np.int64)
+        angle = kernels.rounded(turns)
         along = sines[(angle + 2 * QUARTER) % (2 * TURN)] / UNIT * stretch
         up = sines[angle % (2 * TURN)] / UNIT * stretch
         dx, dy = self.x - self.camera_x, self.y - self.camera_y

@@ -101,7 +101,8 @@ class HangoutPlaces:
         cells = actor.space.cells(None, actor.part)
         pitch = max(1, round(PITCH / plan.lattice.cell))
         on_grid = (cells % pitch == 0).all(axis=1)
-        rooms = plan.room_of_cell[cells[:, 0], cells[:, 1]].astype(np.int64)
+        row, column = cells.T
+        rooms = plan.room_of_cell[row, column].astype(np.int64)
         is_candidate = on_grid & (rooms >= 0) & ~np.isin(rooms, sorted(avoid))
         rooms = rooms[is_candidate]
         points = centres(cells[is_candidate])
@@ -155,7 +156,8 @@ class HangoutPlaces:
         if not len(cells):
             return np.zeros(len(self.points))
         field = actor.space.distance_field(centres(cells))
-        metres = field[self.points[:, 1] // SUB, self.points[:, 0] // SUB]
+        column, row = self.points.T // SUB
+        metres = field[row, column]
         return decay(actor.seconds(metres) / tau)
 
     def _blocking(self) -> F64:
@@ -163,8 +165,10 @@ class HangoutPlaces:
         actor = self._actor
         home = actor.home
         space = home.space(PERSON, opens_doors=True)
-        anchors = home.lattice.to_lattice([room.anchor_xy for room in home.rooms]).tolist()
-        stops = [space.nearest(x, y, 0, room) for room, (x, y) in enumerate(anchors)]
+        stops = []
+        for room in home.rooms:
+            x, y = home.lattice.point_at(room.anchor_xy)
+            stops.append(space.nearest(x, y, 0, room.index))
         reach = (PERSON + actor.entity.radius) * home.lattice.units_per_m
         blocked = np.zeros(len(self.points))
         ways = 0
@@ -267,7 +271,8 @@ class Hangout(BeliefBehavior):
         self.nearness = self.places.nearness(self.near, self.tau.total_seconds())
         self.penalty = self.places.block + SEAT_WEIGHT * self.places.prox
         self.ways: tuple[Space, dict[LatticePoint, F64]] = actor.space, {}
-        self.explored = [r.index for r in actor.reachable_rooms() if r.index not in self.avoided]
+        reachable = (room.index for room in actor.reachable_rooms())
+        self.explored = [room for room in reachable if room not in self.avoided]
         self.rated_output: object = None  # the output behind `worth`; None before the first
         self.rated_by = b""  # the probabilities behind it
         self.worth = -self.penalty

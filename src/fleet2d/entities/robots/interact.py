@@ -328,26 +328,34 @@ class Interact(BeliefBehavior):
             return False
         assert now.requests is not None
         self.set_aside[request.text] = now.time + self.look
-        output = now.outputs.get(self.timing)
-        chance = 1.0
-        to = request.to
-        if output is not None and not callable(getattr(output, "chance", None)):
-            raise ComponentError(
-                f"the output of {self.timing!r} has no chances of asking: name an algorithm of type"
-                " timing, or one whose output has a method `chance`, as TimingChances has"
-            )
-        if output is not None:
-            chance = output.chance(to, request.name, now.time, self._room_of(now, to))
         since, best = self.best_so_far.get(request.text, (request.since, 0.0))
         best = best if since == request.since else 0.0
         # It is asked at the first moment whose chance exceeds a threshold drawn for the request.
-        chance = max(0.0, (chance - best) / (1 - best))
+        chance = max(0.0, (self._welcome(now, self.timing, request) - best) / (1 - best))
         is_drawn = now.random(f"timing {request.text}").uniform() < chance
         best = 0.0 if is_drawn else best + chance * (1 - best)
         self.best_so_far[request.text] = request.since, best
         text = f"{request.text} {chance:.3f} {'asks' if is_drawn else 'waits'}"
         now.requests.opportunities.append((now.step, text))
         return is_drawn
+
+    def _welcome(self, now: Situation, timing: str, request: Request) -> float:
+        """Return with which probability an algorithm would ask now; 1 before its first output.
+
+        Raises:
+            ComponentError: Its output has no such probabilities.
+        """
+        output = now.outputs.get(timing)
+        if output is None:
+            return 1.0
+        if not callable(getattr(output, "chance", None)):
+            raise ComponentError(
+                f"the output of {timing!r} has no chances of asking: name an algorithm of type"
+                " timing, or one whose output has a method `chance`, as TimingChances has"
+            )
+        room = self._room_of(now, request.to)
+        chance: float = output.chance(request.to, request.name, now.time, room)
+        return chance
 
     def _room_of(self, now: Situation, person: str) -> int | None:
         """Return the index of the room of a person in view, or the likeliest one."""

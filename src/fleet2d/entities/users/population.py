@@ -60,7 +60,8 @@ class Population(ResidentBehavior):
         """Return the rooms of a typical activity of such people at the beginning of the run."""
         draws = Draws(stream_key(0, "", "likely"), 0)
         known = catalogue()
-        people = survey.group(survey.groups()[0] if self.group == "any" else self.group)
+        group = survey.groups()[0] if self.group == "any" else self.group
+        people = survey.group(group)
         time = written(time)
         ordinal = (time - timedelta(seconds=survey.DAWN_S)).toordinal()
         state = survey.first_state(people, draws, ordinal)

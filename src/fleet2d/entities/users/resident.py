@@ -490,7 +490,8 @@ class ResidentBehavior(Behavior):
         if venue.activity.away:
             plan.leave_home()
         elif venue.rooms:
-            self.known_home.go(plan.come_home(), activity, venue, Draws(self.key, plan.time_us))
+            draws = Draws(self.key, plan.time_us)
+            self.known_home.go(plan.come_home(), activity, venue, draws)
         else:
             raise PlacementError(f"{activity} can't be done at present: shut doors are in the way")
 
