@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -23,6 +23,11 @@ class Stay(NamedTuple):
     begin: int  # steps
     end: int
 
+    @property
+    def steps(self) -> int:
+        """Its length [steps]."""
+        return self.end - self.begin
+
 
 def stays_of(run: Run, who: str, what: Literal["room", "activity"]) -> list[Stay]:
     """Return the stays of a person or robot, in order of time.
@@ -36,9 +41,8 @@ def stays_of(run: Run, who: str, what: Literal["room", "activity"]) -> list[Stay
     names = [room.name for room in run.plan.rooms]
     room = np.where(path.away, len(names), path.room)
     begins = np.flatnonzero(np.diff(room, prepend=-2)).tolist()
-    ends = [*begins[1:], len(room)]
     words = [*names, AWAY, "between rooms"]
-    return [Stay(words[room[a]], a, b) for a, b in zip(begins, ends, strict=True)]
+    return [Stay(words[room[begin]], begin, end) for begin, end in pairwise([*begins, len(room)])]
 
 
 def _activities(run: Run, who: str) -> list[Stay]:
@@ -81,18 +85,17 @@ def _by_name(run: Run, stays: list[Stay]) -> list[dict[str, Any]]:
     by_name = sorted(stays, key=lambda stay: stay.what)  # stable: in order of time
     for what, group in groupby(by_name, key=lambda stay: stay.what):
         own = list(group)
-        longest = max(own, key=lambda stay: stay.end - stay.begin)
-        rows.append(
-            {
-                "name": what,
-                "hours": _hours(run, sum(stay.end - stay.begin for stay in own)),
-                "stays": len(own),
-                "first": _time(run, own[0].begin),
-                "last": _time(run, own[-1].end),
-                "longest_hours": _hours(run, longest.end - longest.begin),
-                "longest_from": _time(run, longest.begin),
-            }
-        )
+        longest = max(own, key=lambda stay: stay.steps)
+        row = {
+            "name": what,
+            "hours": _hours(run, sum(stay.steps for stay in own)),
+            "stays": len(own),
+            "first": _time(run, own[0].begin),
+            "last": _time(run, own[-1].end),
+            "longest_hours": _hours(run, longest.steps),
+            "longest_from": _time(run, longest.begin),
+        }
+        rows.append(row)
     return sorted(rows, key=lambda row: -row["hours"])
 
 
@@ -104,9 +107,10 @@ def _chosen(run: Run, who: str, of: str) -> list[Stay]:
     """
     if not of:
         raise InputError("name a room, a kind of room or an activity by `of`, or 'away'")
-    rooms = {room.name for room in run.plan.rooms if of in (room.name, room.type)} | {AWAY}
-    if of == AWAY or len(rooms) > 1:
-        rooms = {AWAY} if of == AWAY else rooms - {AWAY}
+    rooms = {room.name for room in run.plan.rooms if of in (room.name, room.type)}
+    if of == AWAY:
+        rooms = {AWAY}
+    if rooms:
         return [stay for stay in stays_of(run, who, "room") if stay.what in rooms]
     activities = stays_of(run, who, "activity")
     known = [*(room.name for room in run.plan.rooms), *(stay.what for stay in activities), AWAY]
@@ -131,22 +135,23 @@ def _by_hour(run: Run, stays: list[Stay]) -> Iterator[dict[str, Any]]:
 
 def _by_day(run: Run, stays: list[Stay]) -> Iterator[dict[str, Any]]:
     """Yield each day with the hours that are spent so, and the first and last moment."""
-    pieces: dict[str, list[tuple[int, int]]] = {}
+    pieces: dict[str, list[Stay]] = {}
     for stay in stays:
         begin = stay.begin
         while begin < stay.end:
             day = run.clock.time(begin).date()
             midnight = datetime.combine(day + timedelta(days=1), datetime.min.time())
             end = min(stay.end, run.clock.step_at_or_after(run.clock.elapsed(midnight)))
-            pieces.setdefault(day.isoformat(), []).append((begin, end))
+            piece = Stay(stay.what, begin, end)
+            pieces.setdefault(day.isoformat(), []).append(piece)
             begin = end
     for name, own in pieces.items():
         yield {
             "day": name,
-            "hours": _hours(run, sum(end - begin for begin, end in own)),
+            "hours": _hours(run, sum(piece.steps for piece in own)),
             "stays": len(own),
-            "first": _time(run, own[0][0]),
-            "last": _time(run, own[-1][1]),
+            "first": _time(run, own[0].begin),
+            "last": _time(run, own[-1].end),
         }
 
 

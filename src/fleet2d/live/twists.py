@@ -33,8 +33,10 @@ def twists(plan: "FloorPlan", before: F64, after: F64, passed_s: float) -> F64:
         enters = _off(before, one)
         leaves = _off(after, other)
         passes = (enters < _off(before, other)) & (leaves < _off(after, one))
-        rest = np.maximum(enters - PORTAL_REACH_M, 0.0) + np.maximum(leaves - PORTAL_REACH_M, 0.0)
-        length = np.where(passes, np.minimum(length, rest), length)
+        to_portal = np.maximum(enters - PORTAL_REACH_M, 0.0)
+        from_portal = np.maximum(leaves - PORTAL_REACH_M, 0.0)
+        shorter = np.minimum(length, to_portal + from_portal)
+        length = np.where(passes, shorter, length)
     share = np.divide(length, covered, out=np.ones(len(after)), where=covered > 0)
     x = x * share
     y = y * share

@@ -230,10 +230,12 @@ def _print_scores(entries: "Sequence[LeaderboardEntry]", split: str) -> None:
     for name in dict.fromkeys(entry.task for entry in entries):
         own = [entry for entry in entries if entry.task == name]
         metrics = [m for m in own[0].scores if not m.endswith((LOWER_END, UPPER_END))]
-        columns = [["", *metrics]]
-        columns += [[printable(e.model), *(cell(e, metric) for metric in metrics)] for e in own]
-        widths = [max(map(len, column)) for column in columns]
+        columns = [["", *map(printable, metrics)]]
+        for entry in own:
+            cells = [cell(entry, metric) for metric in metrics]
+            columns.append([printable(entry.model), *cells])
+        first_width, *widths = [max(map(len, column)) for column in columns]
         typer.echo(f"{name} ({own[0].cases:,} cases of {split})")
         for first, *others in zip(*columns, strict=True):
-            cells = [f"{c:>{width}}" for c, width in zip(others, widths[1:], strict=True)]
-            typer.echo("  ".join([f"  {printable(first):{widths[0]}}", *cells]))
+            line = [first.ljust(first_width), *map(str.rjust, others, widths)]
+            typer.echo(f"  {'  '.join(line)}")

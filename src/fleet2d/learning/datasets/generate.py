@@ -88,32 +88,27 @@ def write_card(data: Dataset, file: DatasetFile, left_out: Sequence[str] = ()) -
     """
     root = data.root
     counts = {split: _count(data, split) for split in data.splits}
+    rows = [
+        [split, c["runs"], f"{c['days']:g}", c["homes"], c["labels"], c["evidence"]]
+        for split, c in counts.items()
+    ]
     text = [
         f"---\n{yaml.safe_dump(_head(data, file), sort_keys=False)}---\n",
         f"# {file.name}\n",
         f"{file.description or 'Evidence of robots in homes, and where people were.'} Made by"
         f" Fleet2D; licence {file.licence}.\n",
         "## How much\n",
-        _table(
-            ["split", "runs", "days", "homes", "labels", "rows of evidence"],
-            [
-                [s, c["runs"], f"{c['days']:g}", c["homes"], c["labels"], c["evidence"]]
-                for s, c in counts.items()
-            ],
-        ),
+        markdown_table(["split", "runs", "days", "homes", "labels", "rows of evidence"], rows),
         *(f"Left out: {text}\n" for text in dict.fromkeys(data.manifest.unfit.values())),
         "No home, household or persona is in more than one split: this is checked before the first"
         " run. No two runs have the same seed, so no two have the same days.\n",
         "## Tables\n",
-        *(
-            f"- `{name}`: {words}. Columns: {', '.join(f'`{c}`' for c in SCHEMAS[name].names)}."
-            for name, words in TABLES.items()
-        ),
+        *(f"- `{name}`: {words}. Columns: {_columns_of(name)}." for name, words in TABLES.items()),
         "\n`step` is the last step that a row knows of: join `evidence` up to a step with `labels`"
         " of that step.\n",
         "## Distributions\n",
         *(f"{line}\n" for line in left_out),
-        *(_distribution(split, c) for split, c in counts.items()),
+        *(_distribution(split, count) for split, count in counts.items()),
         *(f"![{words}]({PICTURES}/{name}.png)\n" for name, words in _draw(root, counts).items()),
         "## Known biases\n",
         *(f"- {bias}" for bias in BIASES),
@@ -123,20 +118,18 @@ def write_card(data: Dataset, file: DatasetFile, left_out: Sequence[str] = ()) -
 
 def _head(data: Dataset, file: DatasetFile) -> dict[str, Any]:
     """Return the head of the card, which the Hub and `datasets` read."""
-    return {
-        "license": file.licence.lower(),
-        "pretty_name": file.name,
-        "configs": [
-            {
-                "config_name": table,
-                "data_files": [
-                    {"split": split, "path": f"{split}/{table}-*.parquet"} for split in data.splits
-                ],
-                **({"default": True} if table == "labels" else {}),
-            }
-            for table in SCHEMAS
-        ],
-    }
+    configs = []
+    for table in SCHEMAS:
+        files = [{"split": name, "path": f"{name}/{table}-*.parquet"} for name in data.splits]
+        config: dict[str, Any] = {"config_name": table, "data_files": files}
+        if table == "labels":
+            config["default"] = True
+        configs.append(config)
+    return {"license": file.licence.lower(), "pretty_name": file.name, "configs": configs}
+
+
+def _columns_of(table: str) -> str:
+    return ", ".join(f"`{name}`" for name in SCHEMAS[table].names)
 
 
 def _count(data: Dataset, split: str) -> dict[str, Any]:
@@ -150,7 +143,10 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
     evidence = f"{split}/evidence-"
     kinds: Counter[str] = Counter()
     for row in labels.aggregate([([], "count_all")]).to_pylist():
-        kinds[rooms.get((row["run"], row["place"]), AWAY)] += row["count_all"]
+        kind = rooms.get((row["run"], row["place"]), AWAY)
+        kinds[kind] += row["count_all"]
+    sizes = Counter(run for run, _ in rooms).values()
+    varied = "; ".join(runs["varied"].to_pylist()).split("; ")
     return {
         "runs": len(runs),
         "days": sum(runs["days"].to_pylist()),
@@ -158,9 +154,9 @@ def _count(data: Dataset, split: str) -> dict[str, Any]:
         "labels": kinds.total(),
         "evidence": sum(files[name].rows for name in files if name.startswith(evidence)),
         "household": Counter(runs["household"].to_pylist()),
-        "varied": Counter(filter(None, "; ".join(runs["varied"].to_pylist()).split("; "))),
+        "varied": Counter(filter(None, varied)),
         "place": kinds,
-        "rooms in a home": Counter(str(n) for n in Counter(run for run, _ in rooms).values()),
+        "rooms in a home": Counter(map(str, sizes)),
     }
 
 
@@ -176,10 +172,10 @@ def _distribution(split: str, counts: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _table(head: list[str], rows: list[list[Any]]) -> str:
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Return a table in Markdown."""
-    cells = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(str(cell) for cell in row)} |" for row in cells) + "\n"
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(str, cells))} |\n" for cells in lines)
 
 
 def _draw(root: Path, counts: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
@@ -212,8 +208,10 @@ def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) 
         keys.sort(key=int)
     width = 0.8 / len(counts)
     for k, (split, own) in enumerate(counts.items()):
-        share = [own[name][key] / max(sum(own[name].values()), 1) for key in keys]
-        at = [i + (k - (len(counts) - 1) / 2) * width for i in range(len(keys))]
+        number = max(sum(own[name].values()), 1)
+        share = [own[name][key] / number for key in keys]
+        shift = (k - (len(counts) - 1) / 2) * width
+        at = [i + shift for i in range(len(keys))]
         axes.bar(at, share, width, label=split, color=USER_COLORS[k % len(USER_COLORS)])
     slanted: dict[str, Any] = {"rotation": 30, "ha": "right"} if name == "place" else {}
     axes.set_xticks(range(len(keys)), keys, **slanted)
@@ -433,15 +431,13 @@ def _write_shards(
     records = {shard: _record_of(root, shard) for shard in plan.shards()}
     lacking = [shard for shard, record in records.items() if not record]
     size = max(1, BLOCK_RUNS // plan.file.runs_per_shard)
-    total, left = (sum(len(s.runs) for s in shards) for shards in (records, lacking))
+    total = sum(len(shard.runs) for shard in records)
+    left = sum(len(shard.runs) for shard in lacking)
     with progress_bar(show=True) as bar:
         task = bar.add_task("runs", total=total, completed=total - left)
         for begin in range(0, len(lacking), size):
-            runs = {
-                shard: [plan.run(shard.split, k) for k in shard.runs]
-                for shard in lacking[begin : begin + size]
-            }
-            planned = [run for own in runs.values() for run in own]
+            runs = {shard: plan.runs_of(shard) for shard in lacking[begin : begin + size]}
+            planned = [*itertools.chain.from_iterable(runs.values())]
             new = [run for run in planned if not _part_path(root, run).is_file()]
             bar.advance(task, len(planned) - len(new))
             by_seed = {run.seed: run for run in new}
@@ -548,8 +544,9 @@ def _encoding(table: pa.Table) -> dict[str, Any]:
     Most rows follow the one before by the same time, so this takes a third less room. The values of
     a belief hardly repeat: their bytes are stored one place after the other.
     """
-    moments = {"step", "next_step", "time"} & {*table.column_names}
-    beliefs = {"probability"} & {*table.column_names}
+    columns = table.column_names
+    moments = {"step", "next_step", "time"}.intersection(columns)
+    beliefs = {"probability"}.intersection(columns)
     return {
         "compression": "zstd",
         "compression_level": 3,
@@ -557,9 +554,7 @@ def _encoding(table: pa.Table) -> dict[str, Any]:
             **dict.fromkeys(moments, "DELTA_BINARY_PACKED"),
             **dict.fromkeys(beliefs, "BYTE_STREAM_SPLIT"),
         },
-        "use_dictionary": [
-            name for name in table.column_names if name not in moments and name not in beliefs
-        ],
+        "use_dictionary": [name for name in columns if name not in moments | beliefs],
         "write_statistics": ["run", "step"],  # by which readers leave out parts of a file
         "store_schema": False,  # that of the dictionaries: readers get texts
     }

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from datetime import timedelta
-from itertools import combinations, takewhile
+from itertools import chain, combinations, takewhile
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -164,7 +164,9 @@ class DatasetPlan:
     @property
     def digest(self) -> str:
         """SHA-256 of all that its content depends on, but the code of Fleet2D."""
-        homes = {name: [home.changes for home in d.homes] for name, d in self.draws.items()}
+        homes = {}
+        for name, draw in self.draws.items():
+            homes[name] = [home.changes for home in draw.homes]
         file = self.file.model_dump(mode="json", exclude={"base"})
         content = [file, self.base.data, homes, self.inputs]
         text = json.dumps(content, sort_keys=True, default=str)
@@ -173,6 +175,10 @@ class DatasetPlan:
     def runs(self, split: str) -> Iterator[PlannedRun]:
         """Draw the runs of a split."""
         return (self.run(split, k) for k in range(self.file.splits[split].runs))
+
+    def runs_of(self, shard: Shard) -> list[PlannedRun]:
+        """Draw the runs of a shard."""
+        return [self.run(shard.split, k) for k in shard.runs]
 
     def shards(self) -> Iterator[Shard]:
         """Yield the shards of all splits, but those without a fit run."""
@@ -328,26 +334,21 @@ def _check_splits(file: DatasetFile, homes: Mapping[str, list[Choice]]) -> None:
     Raises:
         InputError: They do; the message names what they share.
     """
-    people = {
-        name: {
-            origin
-            for household in split.households
-            for user in members_of(household).values()
-            for origin in _origins(user)
-        }
-        for name, split in file.splits.items()
-    }
-    plans = {
-        name: {json.dumps(choice.changes, default=str): choice.words for choice in choices}
-        for name, choices in homes.items()
-    }
+    people: dict[str, set[str]] = {}
+    plans: dict[str, dict[str, str]] = {}
+    for name, split in file.splits.items():
+        users = chain.from_iterable(members_of(each).values() for each in split.households)
+        people[name] = set().union(*map(_origins, users))
+        plans[name] = {json.dumps(home.changes, default=str): home.words for home in homes[name]}
     problems = []
     for one, other in combinations(file.splits, 2):
         shared_homes = [plans[one][key] for key in plans[one] if key in plans[other]]
         shared_people = sorted(people[one] & people[other])
         for kind, shared in (("home", shared_homes), ("persona", shared_people)):
             if shared:
-                names = ", ".join(shared[:5]) + (" …" if len(shared) > 5 else "")
+                names = ", ".join(shared[:5])
+                if len(shared) > 5:
+                    names += " …"
                 problems.append(f"{one} and {other} share {len(shared)} {kind}(s): {names}")
     if problems:
         raise InputError(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from fleet2d.runtime.clock import DAY_S
 from fleet2d.runtime.events import EventKind
 
 if TYPE_CHECKING:
+    from fleet2d.floorplan.rooms.room import Room
     from fleet2d.runs.run import Run
 
 OFFSET = "utc_offset_min"
@@ -39,10 +41,13 @@ _COLUMNS = {
     "labels": f"run time {OFFSET} step user place next_place next_step activity",
     "beliefs": f"run time {OFFSET} step model user place probability",
 }
-SCHEMAS: Mapping[str, pa.Schema] = {
-    table: pa.schema([(name, _KINDS.get(name, pa.string())) for name in names.split()])
-    for table, names in _COLUMNS.items()
-}
+
+
+def _schema_of(names: str) -> pa.Schema:
+    return pa.schema([(name, _KINDS.get(name, pa.string())) for name in names.split()])
+
+
+SCHEMAS: Mapping[str, pa.Schema] = {name: _schema_of(each) for name, each in _COLUMNS.items()}
 """The columns of each table.
 
 `step` and `time` are those of the last step that a row may know of: of a bin of evidence its last,
@@ -74,7 +79,6 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
         labels: Time between labels.
     """
     manifest = run.manifest
-    rooms = run.plan.rooms
     clock = run.clock
     start = clock.times(np.zeros(1, np.int64))[0]
     step_us = int(manifest["step_us"])
@@ -83,20 +87,12 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
     steps = np.arange(every - 1, int(manifest["steps"]), every)
     parts: dict[str, list[dict[str, Any]]] = {
         "runs": [_run_row(planned, users, start, run)],
-        "rooms": [
-            {
-                "room": [room.name for room in rooms],
-                "kind": [room.type for room in rooms],
-                "area_m2": [room.area_m2 for room in rooms],
-                "x": [room.anchor_xy[0] for room in rooms],
-                "y": [room.anchor_xy[1] for room in rooms],
-            }
-        ],
+        "rooms": [_rooms(run.plan.rooms)],
         "evidence": [_evidence(run, step_us)] if EVIDENCE in run.tables else [],
         "labels": [_labels(run, user, steps) for user in users],
         "beliefs": [_belief(run, name) for name in run.tables if name.startswith(BELIEF)],
     }
-    for columns in (columns for of_table in parts.values() for columns in of_table):
+    for columns in chain.from_iterable(parts.values()):
         rows = len(next(iter(columns.values())))
         columns["run"] = np.full(rows, planned.number, np.int32)
         if "step" in columns:
@@ -111,24 +107,35 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
 def _table(name: str, parts: Sequence[Mapping[str, Any]]) -> pa.Table:
     """Return a table of some parts, each with all columns; without parts, it has no rows."""
     schema = SCHEMAS[name]
-    tables = [
-        pa.table([_array(columns[f.name], f.type) for f in schema], names=schema.names)
-        for columns in parts or [dict.fromkeys(schema.names, np.zeros(0, np.int64))]
-    ]
+    nothing = dict.fromkeys(schema.names, np.zeros(0, np.int64))
+    tables = []
+    for columns in parts or [nothing]:
+        arrays = [_array(columns[field.name], field.type) for field in schema]
+        tables.append(pa.table(arrays, names=schema.names))
     return pa.concat_tables(tables).unify_dictionaries()
+
+
+def _rooms(rooms: Sequence["Room"]) -> dict[str, Any]:
+    anchors = np.array([room.anchor_xy for room in rooms])
+    return {
+        "room": [room.name for room in rooms],
+        "kind": [room.type for room in rooms],
+        "area_m2": [room.area_m2 for room in rooms],
+        "x": anchors[:, 0],
+        "y": anchors[:, 1],
+    }
 
 
 def _run_row(planned: PlannedRun, users: Sequence[str], start: Any, run: "Run") -> dict[str, Any]:
     fixed = {"home", "household"}
     varied = [f"{name}={value}" for name, value in planned.labels.items() if name not in fixed]
+    ends = number_array(np.array([0, len(users)], np.int32), pa.int32())
     return {
         "split": [planned.split],
         "home": [str(planned.labels["home"])],
         "household": [str(planned.labels["household"])],
         "varied": ["; ".join(varied)],
-        "users": pa.ListArray.from_arrays(
-            number_array(np.array([0, len(users)], np.int32), pa.int32()), string_array(users)
-        ),
+        "users": pa.ListArray.from_arrays(ends, string_array(users)),
         "seed": [planned.seed],
         "start": np.array([start]),
         "days": [float(run.manifest["simulated_s"]) / DAY_S],
@@ -157,24 +164,27 @@ def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
     since: I64 = np.zeros(0, np.int64)
     activity: Any = np.zeros(0, object)
     if "events" in run.tables:
-        events = columns_of(run, "events", ["event", "entity", "step", "detail"])
-        is_own = (events["event"] == EventKind.ACTIVITY) & (events["entity"] == user)
-        since = events["step"][is_own]
-        activity = events["detail"][is_own]
-        is_change = np.isin(events["event"], [EventKind.KNOWN, EventKind.UNKNOWN])
-        is_change &= events["entity"] == user
-        is_unknown = np.append(False, events["event"][is_change] == EventKind.UNKNOWN)
-        steps = steps[~is_unknown[np.searchsorted(events["step"][is_change], steps, "right")]]
+        every = columns_of(run, "events", ["event", "entity", "step", "detail"])
+        is_own = every["entity"] == user
+        event, step, detail = (every[name][is_own] for name in ("event", "step", "detail"))
+        is_activity = event == EventKind.ACTIVITY
+        since = step[is_activity]
+        activity = detail[is_activity]
+        is_change = np.isin(event, [EventKind.KNOWN, EventKind.UNKNOWN])
+        is_unknown = np.append(False, event[is_change] == EventKind.UNKNOWN)
+        last_change = np.searchsorted(step[is_change], steps, side="right")
+        steps = steps[~is_unknown[last_change]]
     stay = np.searchsorted(begin, steps, side="right") - 1
     is_last = stay + 1 == len(begin)
     following = np.where(is_last, -1, stay + 1)
+    last_activity = np.searchsorted(since, steps, side="right") - 1
     return {
         "step": steps,
         "user": text_array([user], np.zeros(len(steps), np.int64)),
         "place": text_array(place, stay),
         "next_place": text_array(place, following),
         "next_step": np.where(is_last, np.nan, begin[following]),
-        "activity": text_array(activity, np.searchsorted(since, steps, side="right") - 1),
+        "activity": text_array(activity, last_activity),
     }
 
 

@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -211,40 +212,42 @@ def forecasts(data: Dataset, split: str, networks: Networks = SHIPPED) -> SplitF
     beliefs: dict[str, list[F64]] = {}
     for k, whole in enumerate(parts):
         is_first = whole.day < whole.day[0] + networks.tune
-        part = parts[k] = whole.rows(~is_first)
+        part = whole.rows(~is_first)
+        parts[k] = part
         if networks.tune:
             weights[TUNED] = fine_tune(shipped_weights(), [whole.rows(is_first)])
         new = {n: predict(w, part) for n, w in weights.items() if n not in part.beliefs}
         for name, belief in {**part.beliefs, **new}.items():
             beliefs.setdefault(name, []).append(belief)
-    width = max(belief.shape[1] for own in beliefs.values() for belief in own)
     counts = [len(part.truth) for part in parts]
+    is_part = {}
+    for label in sorted({label for part in parts for label in part.labels}):
+        has_label = [label in part.labels for part in parts]
+        is_part[label] = np.repeat(has_label, counts)
     return SplitForecasts(
-        {
-            name: np.concatenate([np.pad(b, ((0, 0), (0, width - b.shape[1]))) for b in own])
-            for name, own in beliefs.items()
-        },
+        {name: _stacked(own) for name, own in beliefs.items()},
         np.concatenate([part.truth for part in parts]),
         np.concatenate([part.gap for part in parts]),
         np.repeat([part.home for part in parts], counts),
-        {
-            label: np.repeat([label in part.labels for part in parts], counts)
-            for label in sorted({label for part in parts for label in part.labels})
-        },
+        is_part,
     )
+
+
+def _stacked(beliefs: Sequence[F64]) -> F64:
+    """Return beliefs in several homes as one; homes with fewer places have zeros."""
+    width = max(belief.shape[1] for belief in beliefs)
+    return np.concatenate([np.pad(each, ((0, 0), (0, width - each.shape[1]))) for each in beliefs])
 
 
 def _score_rtp(data: Dataset, split: str, networks: Networks) -> Scores:
     made = forecasts(data, split, networks)
     if made is None or not len(made.truth):
         return {}
-    return {
-        name: (
-            {**rtp_scores(belief, made.truth, made.gap), **_difference(made, name)},
-            len(made.truth),
-        )
-        for name, belief in made.beliefs.items()
-    }
+    found: Scores = {}
+    for name, belief in made.beliefs.items():
+        scores = rtp_scores(belief, made.truth, made.gap)
+        found[name] = {**scores, **_difference(made, name)}, len(made.truth)
+    return found
 
 
 def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
@@ -252,7 +255,8 @@ def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
 
     The difference has an interval over homes, and is told over all windows and by gap.
     """
-    loss, prior = (log_loss(made.beliefs[model], made.truth) for model in (name, PRIOR))
+    loss = log_loss(made.beliefs[name], made.truth)
+    prior = log_loss(made.beliefs[PRIOR], made.truth)
     every = np.ones(len(loss), np.bool_)
     parts = [(label, own) for label, own in made.parts.items() if own.any() and not own.all()]
     scores = {f"log_loss of {label}": float(loss[own].mean()) for label, own in parts[:MAX_PARTS]}
@@ -272,18 +276,15 @@ def measures_by_gap(made: SplitForecasts) -> GapMeasures:
         "accuracy": partial(top_k, k=1),
         "log loss [nats]": log_loss,
     }
-    return {
-        measure: {
-            name: {
-                gap: (mean.mean, mean.low, mean.high)
-                for values in [score(belief, made.truth)]
-                for gap, own in by_gap(made.gap)
-                for mean in [made.over_homes(values, own)]
-            }
-            for name, belief in made.beliefs.items()
-        }
-        for measure, score in measures.items()
-    }
+    found: dict[str, dict[str, dict[str, tuple[float, float, float]]]] = {}
+    for measure, score in measures.items():
+        found[measure] = {}
+        for name, belief in made.beliefs.items():
+            values = score(belief, made.truth)
+            means = {gap: made.over_homes(values, own) for gap, own in by_gap(made.gap)}
+            ends = {gap: (mean.mean, mean.low, mean.high) for gap, mean in means.items()}
+            found[measure][name] = ends
+    return found
 
 
 def _score_ltp(data: Dataset, split: str, _: object) -> Scores:
@@ -299,7 +300,8 @@ def _score_ltp(data: Dataset, split: str, _: object) -> Scores:
         truth = np.array([at_home.count(name) for name in names]) / len(at_home)
         seen = np.zeros(len(names))
         watched = np.zeros(len(names))
-        if (rows := evidence.get((run,))) is not None:
+        rows = evidence.get((run,))
+        if rows is not None:
             room = np.array([names.index(name) for name in rows["room"]])
             is_look = rows["user"] == ANYONE
             is_user = rows["user"] == user
@@ -352,7 +354,8 @@ def _returns(data: Dataset, split: str) -> tuple[I64, F64]:
 
 
 def _score_time_to_return(data: Dataset, split: str, _: object) -> Scores:
-    (hour, known), (asked, truth) = _returns(data, TRAIN), _returns(data, split)
+    hour, known = _returns(data, TRAIN)
+    asked, truth = _returns(data, split)
     if not len(known) or not len(truth):
         return {}
     overall = float(np.median(known))
@@ -368,10 +371,8 @@ def _score_shares(
     data: Dataset, split: str, _: object, cases: Callable[[Any], Iterable[Any]], given: str
 ) -> Scores:
     """Score the shares of each outcome in the training: overall, and given what is known."""
-    known, asked = (
-        [case for labels in labels_by_person(data, part) for case in cases(labels)]
-        for part in (TRAIN, split)
-    )
+    known = [*chain.from_iterable(map(cases, labels_by_person(data, TRAIN)))]
+    asked = [*chain.from_iterable(map(cases, labels_by_person(data, split)))]
     if not known or not asked:
         return {}
     outcomes = sorted({what for _, what in [*known, *asked]})
@@ -388,16 +389,12 @@ def _score_shares(
         "most common": np.tile(base, (len(truth), 1)),
         f"by {given}": np.array([tables.get(condition, base) for condition, _ in asked]),
     }
-    return {
-        name: (
-            {
-                "log_loss": float(log_loss(belief, truth).mean()),
-                "accuracy": float(top_k(belief, truth, 1).mean()),
-            },
-            len(truth),
-        )
-        for name, belief in beliefs.items()
-    }
+    found: Scores = {}
+    for name, belief in beliefs.items():
+        loss = float(log_loss(belief, truth).mean())
+        accuracy = float(top_k(belief, truth, 1).mean())
+        found[name] = {"log_loss": loss, "accuracy": accuracy}, len(truth)
+    return found
 
 
 def labels_by_person(data: Dataset, split: str) -> Iterator[dict[str, Any]]:
@@ -420,16 +417,16 @@ def _groups(data: Dataset, table: str, split: str, *also: str) -> dict[Any, dict
     """Return the rows of a table as arrays by run, and by further columns, in order."""
     rows = data.arrow(table, split)
     columns = {name: rows[name].to_numpy(zero_copy_only=False) for name in rows.column_names}
-    numbers = [np.unique(columns[name], return_inverse=True)[1] for name in ("run", *also)]
+    keys = [columns[name] for name in ("run", *also)]
+    numbers = [np.unique(key, return_inverse=True)[1] for key in keys]
     order = np.lexsort(numbers[::-1])
     changes = np.any([np.diff(number[order], prepend=-1) != 0 for number in numbers], axis=0)
     parts = np.split(order, np.flatnonzero(changes)[1:]) if len(order) else []
-    return {
-        tuple(columns[name][part[0]] for name in ("run", *also)): {
-            name: values[part] for name, values in columns.items()
-        }
-        for part in parts
-    }
+    groups = {}
+    for part in parts:
+        group = tuple(key[part[0]] for key in keys)
+        groups[group] = {name: values[part] for name, values in columns.items()}
+    return groups
 
 
 TASKS: Mapping[str, Callable[[Dataset, str, Networks], Scores]] = {

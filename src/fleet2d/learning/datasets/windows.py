@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import timedelta
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -138,8 +139,11 @@ class _Dense:
         facts: PlaceFacts,
         start: np.datetime64,
     ) -> None:
-        self.labels, self.beliefs, self.facts = labels, beliefs, facts
-        step_us = int((labels["time"][0] - start) / MICROSECOND) // max(int(labels["step"][0]), 1)
+        self.labels = labels
+        self.beliefs = beliefs
+        self.facts = facts
+        first_us = int((labels["time"][0] - start) / MICROSECOND)
+        step_us = first_us // max(int(labels["step"][0]), 1)
         self.bin_steps = steps_of_bin(step_us)
         last = max(int(evidence["step"].max(initial=0)), int(labels["step"].max()))
         count = (last + 1) // self.bin_steps
@@ -154,18 +158,19 @@ class _Dense:
         self.seen: dict[str, F64] = {}
         for user in set(evidence["user"].tolist()):
             own = evidence["user"] == user
-            seen = self.seen[user] = np.zeros(self.watched.shape)
-            seen[bin_[own], room[own]] = evidence["seen"][own]
-        known = [seen for user, seen in self.seen.items() if user != ANYONE]
-        anyone = self.seen.get(ANYONE, np.zeros(self.watched.shape))
-        self.unknown = (anyone > sum(known, np.zeros(self.watched.shape))).astype(np.uint8)
+            self.seen[user] = np.zeros(self.watched.shape)
+            self.seen[user][bin_[own], room[own]] = evidence["seen"][own]
+        nobody = np.zeros(self.watched.shape)
+        known = sum((seen for user, seen in self.seen.items() if user != ANYONE), nobody)
+        self.unknown = (self.seen.get(ANYONE, nobody) > known).astype(np.uint8)
         midnight = start.astype("datetime64[D]")
         since_us = (start - midnight) / MICROSECOND
         time = int(since_us) + (self.step + 1 - self.bin_steps) * step_us
         # The clock may have been changed since the start.
         own = labels["user"] == labels["user"][0]
         steps = labels["step"][own].astype(np.int64)
-        shift_us = (labels["time"][own] - start).astype("m8[us]").astype(np.int64) - steps * step_us
+        read_us = (labels["time"][own] - start).astype("m8[us]").astype(np.int64)
+        shift_us = read_us - steps * step_us
         time += shift_us[np.searchsorted(steps, self.step).clip(0, len(steps) - 1)]
         ordinal = int((midnight - FIRST_DAY) / np.timedelta64(1, "D")) + 1
         self.day = ordinal + time // DAY_US
@@ -199,22 +204,29 @@ class _Dense:
         assert kept is not None, "there are beliefs"
         features = trace_evidence(np.zeros(trace_size(rooms)), rooms, self.of(user))[kept]
         features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
-        places = self.facts.features
-        known = features.astype(np.float32)
-        time = self.step[kept], self.day[kept]
-        return Windows(number, home, of_run, user, places, known, truth[kept], *time, stored)
+        return Windows(
+            number,
+            home,
+            of_run,
+            user,
+            self.facts.features,
+            features.astype(np.float32),
+            truth[kept],
+            self.step[kept],
+            self.day[kept],
+            stored,
+        )
 
 
 def _by_run(table: pa.Table) -> dict[int, dict[str, Any]]:
     """Return the columns of each run as arrays; runs are in order, and each in one piece."""
     run = table["run"].to_numpy()
     first = np.flatnonzero(np.diff(run, prepend=-1))
-    ends = [*first[1:].tolist(), len(run)] if len(run) else []
     columns = {name: _array(table[name]) for name in table.column_names if name != "run"}
-    return {
-        int(run[a]): {name: values[a:b] for name, values in columns.items()}
-        for a, b in zip(first.tolist(), ends, strict=True)
-    }
+    by_run = {}
+    for begin, end in pairwise([*first.tolist(), len(run)]):
+        by_run[int(run[begin])] = {name: values[begin:end] for name, values in columns.items()}
+    return by_run
 
 
 def _array(column: Any) -> Any:

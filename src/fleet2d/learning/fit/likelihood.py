@@ -91,7 +91,8 @@ class ProductLikelihood:
     """The likelihood of outcomes whose probability is a product of factors."""
 
     def __init__(self, factors: Sequence[Factor], outcomes: Bool) -> None:
-        self.factors, self.outcomes = factors, outcomes
+        self.factors = factors
+        self.outcomes = outcomes
         self.lower = np.array([v for factor in factors for v in factor.lower])
         self.upper = np.array([v for factor in factors for v in factor.upper])
 

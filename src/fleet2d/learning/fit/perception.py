@@ -263,17 +263,16 @@ class Calibration:
         # Dense enough for straight lines between rows to be within 0.3 % of the logistic curve.
         width = estimates["distance width"].value if "distance width" in estimates else farthest
         rows = min(MAX_ROWS, 2 + int(2 * farthest / width))
-        places = [_short(x) for x in np.linspace(0, farthest, rows).tolist()]
-        shares = [round(_at(estimates, x), 4) for x in places]
-        right = [[x, share] for x, share in zip(places, shares, strict=True)]
-        mistaken = [  # rounded down
-            [x, int(recognition.mistaken.value * (1 - share) * 10_000) / 10_000]
-            for x, share in zip(places, shares, strict=True)
-        ]
-        confusion = {
-            user: {name: share for name, share in others.items() if share}
-            for user, others in recognition.confusion.items()
-        }
+        right = []
+        mistaken = []
+        for place in map(_short, np.linspace(0, farthest, rows).tolist()):
+            share = round(_at(estimates, place), 4)
+            right.append([place, share])
+            taken_for_others = recognition.mistaken.value * (1 - share)
+            mistaken.append([place, int(taken_for_others * 10_000) / 10_000])  # rounded down
+        confusion = {}
+        for user, others in recognition.confusion.items():
+            confusion[user] = {name: share for name, share in others.items() if share}
         return {"right": right, "mistaken": mistaken, "confusion": confusion}
 
 

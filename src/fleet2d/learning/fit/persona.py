@@ -98,13 +98,13 @@ def fit_persona(
     fitter.rest(days)
     activities = fitter.activities
     if private:
-        texts = [text for template in templates.values() for text in template["recorded"]]
-        used = {"rest", *(name for text in texts for name in parse_day(text).activities)}
-        activities = {
-            name: {key: value for key, value in fields.items() if key != "takes"}
-            for name, fields in activities.items()
-            if name in used
-        }
+        used = {"rest"}
+        for template in templates.values():
+            for text in template["recorded"]:
+                used.update(parse_day(text).activities)
+        activities = {name: {**fields} for name, fields in activities.items() if name in used}
+        for fields in activities.values():
+            fields.pop("takes", None)
     document = {
         "about": about or f"fitted to {len(days)} days of a log",
         "activities": activities,
@@ -247,14 +247,18 @@ def usual_posture(activity: str) -> str:
     >>> [usual_posture(name) for name in ("cook_dinner", "eat_dinner", "bed_toilet_transition")]
     ['stand', 'sit', 'stand']
     """
-    words = {"stand": STAND, "lie": LIE, "sit": SIT}
-    return next((p for p, names in words.items() if any(n in activity for n in names)), "stand")
+    for posture, words in (("stand", STAND), ("lie", LIE), ("sit", SIT)):
+        if any(word in activity for word in words):
+            return posture
+    return "stand"
 
 
 def _recorded_day(timeline: Timeline, day: LivedDay, names: Sequence[str]) -> RecordedDay:
     """Return a day of a log, to the second; in unknown times, the activity before continues."""
     midnight = day.number * DAY_S
-    wake, bed, next_wake = (60 * minute for minute in (day.wake, day.bed, day.next_wake))
+    wake = 60 * day.wake
+    bed = 60 * day.bed
+    next_wake = 60 * day.next_wake
     flat = timeline.seconds.ravel()
     awake = flat[midnight + wake : midnight + bed]
     entries = [(wake + at, names[state]) for state, at, _ in runs(awake) if state >= 0]

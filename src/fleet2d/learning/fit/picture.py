@@ -48,22 +48,19 @@ def _persona_figure(
     real = timeline.rooms[[day.number for day in days]]
     sampled = sample_persona(fitted, timeline, SAMPLED, seed)[1]
     sets = (real, sampled, sample_markov(real, count, SAMPLED, seed))
-    colors = [ROOM_COLORS.get(place, OTHER_COLOR) for place in timeline.places]
-    columns = max(3, count)
-    figure = Figure(figsize=(2.1 * columns, 5.2), dpi=150, layout="constrained")
+    colors = {place: ROOM_COLORS.get(place, OTHER_COLOR) for place in timeline.places}
+    colors[AWAY] = "white"
+    figure = Figure(figsize=(2.1 * max(3, count), 5.2), dpi=150, layout="constrained")
     upper: Any
     lower: Any
     upper, lower = figure.subfigures(2, 1)  # type: ignore[misc]
     for axes, labels, label in zip(upper.subplots(1, 3, sharey=True), sets, LABELS, strict=True):
         stacked = np.cumsum(by_hour(labels, count), axis=1)
         below = np.zeros(24)
-        for i, place in enumerate(timeline.places):
-            color = "white" if place == AWAY else colors[i]
-            axes.bar(
-                np.arange(24) + 0.5, stacked[:, i] - below, 1, below, color=color, label=place,
-                edgecolor="#d0d0d0", linewidth=0.3,
-            )  # fmt: skip
-            below = stacked[:, i]
+        for above, place in zip(stacked.T, timeline.places, strict=True):
+            style = {"color": colors[place], "edgecolor": "#d0d0d0", "linewidth": 0.3}
+            axes.bar(np.arange(24) + 0.5, above - below, 1, below, label=place, **style)
+            below = above
         axes.set(title=label, xlim=(0, 24), ylim=(0, 1), xticks=(0, 6, 12, 18, 24))
         axes.set_xlabel("hour of the day")
     upper.axes[0].set_ylabel("share of the time")
@@ -78,11 +75,11 @@ def _draw_stays(panels: Sequence[Any], sets: Sequence[Any], timeline: Timeline) 
     stays = [dwell_times(labels, count) for labels in sets]
     share = [shares(labels, count) for labels in sets]
     for i, (axes, place) in enumerate(zip(panels, timeline.places, strict=True)):
-        for k, color in enumerate(LINES):
-            lengths = stays[k][i]
+        for lengths_by_place, label, color in zip(stays, LABELS, LINES, strict=True):
+            lengths = lengths_by_place[i]
             if len(lengths):
                 at = np.arange(1, len(lengths) + 1) / len(lengths)
-                axes.step(lengths, at, where="post", color=color, linewidth=1.3, label=LABELS[k])
+                axes.step(lengths, at, where="post", color=color, linewidth=1.3, label=label)
         percent = " / ".join(f"{100 * part[i]:.0f}" for part in share)
         axes.set_title(f"{place.replace('_', ' ')}\n{percent} %", fontsize=8)
         axes.set(xscale="log", xlim=(1, 1440), ylim=(0, 1), xticks=(1, 10, 100, 1000))
@@ -150,20 +147,20 @@ def _draw_shares(axes: Axes, values: F64, detected: Bool, shares: F64) -> None:
         inside = index == part
         if inside.any():
             hit = wilson(int(detected[inside].sum()), int(inside.sum()))
-            ends = (hit.value - (hit.low or 0.0), (hit.high or 1.0) - hit.value)
-            rows.append((values[inside].mean(), hit.value, *ends, shares[inside].mean()))
-    x, y, below, above, fit = np.array(rows).T
+            below = hit.value - (hit.low or 0.0)
+            above = (hit.high or 1.0) - hit.value
+            rows.append((values[inside].mean(), hit.value, below, above, shares[inside].mean()))
+    x, y, *reach, fit = np.array(rows).T
     axes.plot(x, fit, color=FIT_COLOR, lw=2, label="fitted")
-    axes.errorbar(
-        x, y, yerr=[below, above], fmt="o", ms=4, color=OBSERVED_COLOR, lw=1, label="observed, 95 %"
-    )
+    style: dict[str, Any] = {"fmt": "o", "ms": 4, "color": OBSERVED_COLOR, "lw": 1}
+    axes.errorbar(x, y, reach, label="observed, 95 %", **style)
 
 
 def _draw_groups(axes: Axes, groups: "list[ProbabilityGroup]") -> None:
     """Draw observed against predicted probabilities, with intervals."""
     axes.plot([0, 1], [0, 1], color="#b0b5bd", lw=1)
     for group in groups:
-        low, high = group.observed.low or 0.0, group.observed.high or 1.0
-        axes.plot([group.predicted] * 2, [low, high], color=OBSERVED_COLOR, lw=1)
+        interval = [group.observed.low or 0.0, group.observed.high or 1.0]
+        axes.plot([group.predicted] * 2, interval, color=OBSERVED_COLOR, lw=1)
         axes.plot(group.predicted, group.observed.value, "o", ms=4, color=OBSERVED_COLOR)
     axes.set(xlabel="predicted", ylabel="observed", xlim=(0, 1), ylim=(0, 1))

@@ -56,10 +56,10 @@ def repeats(days: Sequence[RecordedDay], log: Sequence[RecordedDay]) -> Repeats:
     >>> print(repeats([one, two], [one, two]))
     2.0 on average, 2 at most
     """
-    longest = [
-        max((_longest_run(day, other) for other in log if other is not day), default=0)
-        for day in days
-    ]
+    longest = []
+    for day in days:
+        runs = [_longest_run(day, other) for other in log if other is not day]
+        longest.append(max(runs, default=0))
     return Repeats(sum(longest) / max(len(longest), 1), max(longest, default=0))
 
 
@@ -71,7 +71,12 @@ def _longest_run(day: RecordedDay, other: RecordedDay) -> int:
     last = -1
     for change in _changes(day):
         at = after.get(change, -1)
-        run = 0 if at < 0 else run + 1 if run and at == last + 1 else 1
+        if at < 0:
+            run = 0
+        elif at == last + 1:
+            run += 1
+        else:
+            run = 1
         longest = max(longest, run)
         last = at
     return longest

@@ -395,18 +395,22 @@ def distances(real: I16, other: I16, count: int) -> RoutineDistances:
     stays = zip(dwell_times(real, count), dwell_times(other, count), strict=True)
     pairs = [pair for pair in stays if len(pair[0]) >= MIN_STAYS]
     total = max(sum(len(times) for times, _ in pairs), 1)
+    share = total_variation(shares(real, count), shares(other, count))
+    hours = total_variation(by_hour(real, count), by_hour(other, count))
+    changes = total_variation(transition_shares(real, count), transition_shares(other, count))
     return RoutineDistances(
-        share=float(total_variation(shares(real, count), shares(other, count))),
-        hours=float(np.mean(total_variation(by_hour(real, count), by_hour(other, count)))),
+        share=float(share),
+        hours=float(np.mean(hours)),
         ks=sum_in_order(len(a) * ks_distance(a, b) for a, b in pairs) / total,
         stay_min=sum_in_order(len(a) * wasserstein(a, b) for a, b in pairs) / total,
-        transitions=float(total_variation(*(transition_shares(d, count) for d in (real, other)))),
+        transitions=float(changes),
     )
 
 
 def transition_shares(labels: I16, count: int) -> F64:
     """Return the share of each change from one known label to another, float64 (count**2,)."""
-    before, after = labels[:, :-1].ravel(), labels[:, 1:].ravel()
+    before = labels[:, :-1].ravel()
+    after = labels[:, 1:].ravel()
     changes = np.flatnonzero((before != after) & (before >= 0) & (after >= 0))
     pairs = before[changes].astype(np.int64) * count + after[changes]
     return np.bincount(pairs, minlength=count * count) / max(len(pairs), 1)

@@ -133,12 +133,14 @@ class Validation(NamedTuple):
             "dwell times (KS)": "ks", "hours": "hours", "time shares": "share",
             "transitions": "transitions",
         }  # fmt: skip
-        return [
-            f"{name}{unit} {getattr(persona, key):.3f}, copies {getattr(copies, key):.3f}"
-            for unit, (persona, copies, *_) in (("", self.rooms), (" to the second", self.seconds))
-            for name, key in keys.items()
-            if getattr(persona, key) > getattr(copies, key) + EQUAL
-        ]
+        lines = []
+        for unit, (persona, copies, *_) in (("", self.rooms), (" to the second", self.seconds)):
+            for name, key in keys.items():
+                own = getattr(persona, key)
+                copied = getattr(copies, key)
+                if own > copied + EQUAL:
+                    lines.append(f"{name}{unit} {own:.3f}, copies {copied:.3f}")
+        return lines
 
 
 def validate(
@@ -188,7 +190,8 @@ def _fold(
     """
     states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
     rooms_by_second = sample_persona(fitted, timeline, SAMPLED_BY_SECOND, seed, to_second=True)[1]
-    rest_days, held_days = ([day.number for day in part] for part in (rest, held))
+    rest_days = [day.number for day in rest]
+    held_days = [day.number for day in held]
     places = len(timeline.places)
     activities = len(timeline.states)
     seconds = timeline.places_of(timeline.seconds)

@@ -159,22 +159,21 @@ def run_transfer(
     directory = StudyDirectory(location)
     directory.check_empty()
     inputs = _inputs(plan)
-    frame = pl.DataFrame(
-        [
-            {
-                **cell._asdict(),
-                SEED: plan.file.seed,
-                "identity": _identity(code_version(), inputs, cell),
-                "template": _identity(cell),
-                "home_key": f"{cell.home} {cell.task}",
-                "simulated_s": 0.0,
-                "index": number,
-                VARIANT: number,
-            }
-            for number, cell in enumerate(plan.cells)
-        ],
-        schema_overrides={VARIANT: pl.Int32, "index": pl.Int32, SEED: pl.Int64, "days": pl.Int64},
-    )
+    rows = [
+        {
+            **cell._asdict(),
+            SEED: plan.file.seed,
+            "identity": _identity(code_version(), inputs, cell),
+            "template": _identity(cell),
+            "home_key": f"{cell.home} {cell.task}",
+            "simulated_s": 0.0,
+            "index": number,
+            VARIANT: number,
+        }
+        for number, cell in enumerate(plan.cells)
+    ]
+    kinds = {VARIANT: pl.Int32, "index": pl.Int32, SEED: pl.Int64, "days": pl.Int64}
+    frame = pl.DataFrame(rows, schema_overrides=kinds)
     with directory.locked():
         for problem in drop_damaged(directory.storage):
             observer.on_note(problem)
@@ -186,10 +185,10 @@ def run_transfer(
         _write_plan(directory, plan, frame)
         complete = results.filter(status=COMPLETE)[VARIANT]
         missing = frame.filter(~pl.col(VARIANT).is_in(complete.implode()))
+        columns = ("index", VARIANT, "identity", "home_key")
         tasks = [
-            CellTask(row[VARIANT], row["index"], row["identity"], row["home_key"], cell)
-            for row in missing.to_dicts()
-            for cell in [plan.cells[row["index"]]]
+            CellTask(variant, index, identity, home_key, plan.cells[index])
+            for index, variant, identity, home_key in missing.select(columns).iter_rows()
         ]
         sources = Sources(plan, folder)
         unfit = sources.make(sources.names([task.cell for task in tasks]), crew)
@@ -222,9 +221,12 @@ def _write_plan(directory: StudyDirectory, plan: TransferPlan, frame: "pl.DataFr
         columns=COLUMNS,
         populations=("home", SEED),
         tables=(DAYS_TABLE,),
-        compare=tuple(
-            {"metric": metric, "against": {"arm": "real"}, "within": ("task", "learner", "days")}
-            for metric in ("log_loss",)
+        compare=(
+            {
+                "metric": "log_loss",
+                "against": {"arm": "real"},
+                "within": ("task", "learner", "days"),
+            },
         ),
         source=plan.source,
         metrics=METRICS,

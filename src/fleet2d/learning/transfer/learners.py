@@ -61,14 +61,13 @@ def moments(trace: MinuteTrace, task: str) -> ForecastMoments:
     outcomes = trace.rooms if ahead else trace.activities
     count = len(codes)
     at = np.arange(HISTORY, count - ahead, STRIDE)
-    inside = np.isin((at + ahead) // DAY_MINUTES, trace.days) & np.isin(
-        at // DAY_MINUTES, trace.days
-    )
-    at = at[inside & (codes[at] >= 0) & (outcomes[at + ahead] >= 0)]
+    known = np.isin(at // DAY_MINUTES, trace.days) & (codes[at] >= 0)
+    then = at + ahead
+    known_then = np.isin(then // DAY_MINUTES, trace.days) & (outcomes[then] >= 0)
+    at = at[known & known_then]
     outcome = outcomes[at + ahead].astype(np.int64)
-    return ForecastMoments(
-        _features(codes, trace.weekday, at), outcome, at // DAY_MINUTES, np.ones(len(at))
-    )
+    features = _features(codes, trace.weekday, at)
+    return ForecastMoments(features, outcome, at // DAY_MINUTES, np.ones(len(at)))
 
 
 def _features(codes: I16, weekday: int, at: I64) -> Any:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fleet2d.algorithms.presence.learned import TRUSTS
-from fleet2d.kernels import I64
+from fleet2d.kernels import F64, I64
 from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, predict, train
 from fleet2d.learning.datasets.windows import PRIOR, Windows
 from fleet2d.learning.transfer.learners import Forecast
@@ -33,13 +33,15 @@ def thinned(parts: Sequence[Windows], rows: int) -> list[Windows]:
 def presence_forecast(sources: Sources, cell: Cell) -> Forecast:
     """Train the network of a cell, and score it on the days of its home that are tested on."""
     rows = sources.file.rows
-    log = sources.windows_of(f"log-{cell.home}")
+    own_log = f"log-{cell.home}"
+    log = sources.windows_of(own_log)
     own = of_days(log, sources.homes[cell.home].own(cell.days)) if cell.days else []
-    used = [name for name in sources.needed(cell) if name != f"log-{cell.home}"]
-    real = [part for name in used if name.startswith("log-") for part in sources.windows_of(name)]
-    made = [
-        part for name in used if not name.startswith("log-") for part in sources.windows_of(name)
-    ]
+    real: list[Windows] = []
+    made: list[Windows] = []
+    for name in sources.needed(cell):
+        if name != own_log:
+            kind = real if name.startswith("log-") else made
+            kind += sources.windows_of(name)
     known = [*thinned(real, rows), *thinned(made, rows)]
     if cell.arm == "own":
         known = own
@@ -49,18 +51,21 @@ def presence_forecast(sources: Sources, cell: Cell) -> Forecast:
     if cell.arm == "tuned":
         weights = fine_tune(weights, own)
     asked = of_days(log, sources.tested[cell.home])
-    beliefs = [predict(weights, part) for part in asked]
-    return Forecast(
-        np.concatenate([log_loss(b, p.truth) for b, p in zip(beliefs, asked, strict=True)]),
-        np.concatenate([top_k(b, p.truth, 1) for b, p in zip(beliefs, asked, strict=True)]),
-        np.concatenate([part.step // DAY_S for part in asked]),
-        {
-            "unseen": 0.0,
-            "naive_accuracy": float(
-                np.concatenate([top_k(p.beliefs[PRIOR], p.truth, 1) for p in asked]).mean()
-            ),
-            "naive_log_loss": float(
-                np.concatenate([log_loss(p.beliefs[PRIOR], p.truth) for p in asked]).mean()
-            ),
-        },
-    )
+    loss, hit = _scored(asked, [predict(weights, part) for part in asked])
+    naive_loss, naive_hit = _scored(asked, [part.beliefs[PRIOR] for part in asked])
+    metrics = {
+        "unseen": 0.0,
+        "naive_accuracy": float(naive_hit.mean()),
+        "naive_log_loss": float(naive_loss.mean()),
+    }
+    return Forecast(loss, hit, np.concatenate([part.step // DAY_S for part in asked]), metrics)
+
+
+def _scored(parts: Sequence[Windows], beliefs: Sequence[F64]) -> tuple[F64, F64]:
+    """Return the log loss of beliefs in windows, and whether the likeliest place was right."""
+    loss = []
+    hit = []
+    for part, belief in zip(parts, beliefs, strict=True):
+        loss.append(log_loss(belief, part.truth))
+        hit.append(top_k(belief, part.truth, 1))
+    return np.concatenate(loss), np.concatenate(hit)

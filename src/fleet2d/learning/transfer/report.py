@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fleet2d.learning.datasets.generate import markdown_table
 from fleet2d.learning.transfer.driver import DAYS_TABLE
 from fleet2d.learning.transfer.specification import ARMS
 from fleet2d.runtime.determinism import sum_in_order
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REFERENCE = "real"
+BY_DAY = ("difference_by_day", "low_by_day", "high_by_day")
 PAGE = "report.md"
 MARKERS = "osD^v<>Px"
 
@@ -44,16 +46,11 @@ def compared(study: Study, task: str, against: str) -> "pl.DataFrame":
     keys = ["home", "learner", "days", "day"]
     pairs = scores.join(scores.filter(arm=against), on=keys, suffix="_of")
     pairs = pairs.with_columns(less=pl.col("log_loss") - pl.col("log_loss_of"))
-    found = [
-        over_days([home["less"].to_list() for home in rows.partition_by("home")])
-        for arm, learner, days in table.select("arm", "learner", "days").iter_rows()
-        for rows in [pairs.filter(arm=arm, learner=learner, days=days)]
-    ]
-    columns = zip(*found, strict=True)
-    names = ("difference_by_day", "low_by_day", "high_by_day")
-    return table.with_columns(
-        pl.Series(name, values) for name, values in zip(names, columns, strict=True)
-    )
+    found = []
+    for arm, learner, days in table.select("arm", "learner", "days").iter_rows():
+        homes = pairs.filter(arm=arm, learner=learner, days=days).partition_by("home")
+        found.append(over_days([home["less"].to_list() for home in homes]))
+    return table.hstack(pl.DataFrame(found, BY_DAY, orient="row"))
 
 
 def over_days(homes: Sequence[Sequence[float]]) -> tuple[float, float, float]:
@@ -89,7 +86,7 @@ def write_report(study: Study, folder: Path) -> list[str]:
         metric = headline(task)
         picture = folder / f"{task.replace(' ', '_')}.png"
         write_picture(picture, lambda task=task: draw(study, task))  # type: ignore[misc]
-        lines += [f"## {task}", "", *table(study, task), "", f"![{metric}]({picture.name})", ""]
+        lines += [f"## {task}", "", table(study, task), f"![{metric}]({picture.name})", ""]
     for task in _told(tasks):
         sentences += sentences_of(study, task)
     lines += [*sentences, "", *study.meta.notes.splitlines()]
@@ -104,7 +101,7 @@ def _told(tasks: Sequence[str]) -> list[str]:
     return [*hour, *(task for task in tasks if task not in rooms)][:2]
 
 
-def table(study: Study, task: str) -> list[str]:
+def table(study: Study, task: str) -> str:
     """Return the table of a task in Markdown: scores, and differences to real days."""
     metric = headline(task)
     means = study.summary(metric, ["task", "learner", "days", "arm"]).filter(task=task)
@@ -112,15 +109,15 @@ def table(study: Study, task: str) -> list[str]:
     head = ["learner", "own days", "arm", "homes", metric.replace("_", " ")]
     head += [f"difference to {REFERENCE} (95 % over homes)", "better in"]
     head += ["difference in log loss (95 % over the days of these homes)"]
-    lines = [f"| {' | '.join(head)} |", "| " + " | ".join(["---"] * len(head)) + " |"]
+    rows = []
     for row in means.sort("learner", "days", descending=[True, False]).to_dicts():
         cells = [row["learner"], row["days"], row["arm"], row["variants"], f"{row['mean']:.3f}"]
         pair: list[Any] = []
         if pairs is not None and row["arm"] != REFERENCE:
             pair = pairs.filter(arm=row["arm"], learner=row["learner"], days=row["days"]).to_dicts()
         cells += _compared_cells(pair[0], task) if pair else [""] * 3
-        lines.append(f"| {' | '.join(map(str, cells))} |")
-    return lines
+        rows.append(cells)
+    return markdown_table(head, rows)
 
 
 def _has(study: Study, task: str, arm: str) -> bool:
@@ -133,9 +130,9 @@ def _has(study: Study, task: str, arm: str) -> bool:
 
 
 def _compared_cells(row: dict[str, Any], task: str) -> list[str]:
-    by_day = [row[f"{name}_by_day"] for name in ("difference", "low", "high")]
-    better = f"{_better(row, task)} of {row['pairs']}"
-    return [interval(row["difference"], row["low"], row["high"]), better, interval(*by_day)]
+    over_homes = interval(row["difference"], row["low"], row["high"])
+    by_day = interval(*(row[name] for name in BY_DAY))
+    return [over_homes, f"{_better(row, task)} of {row['pairs']}", by_day]
 
 
 def interval(mean: float, low: float, high: float) -> str:
@@ -164,7 +161,7 @@ def _sentence(task: str, against: str, arm: str, rows: list[dict[str, Any]]) -> 
     metric = headline(task).replace("_", " ")
     parts = []
     for row in (rows[0], rows[-1]) if len(rows) > 1 else rows:
-        by_day = [row[f"{name}_by_day"] for name in ("difference", "low", "high")]
+        by_day = (row[name] for name in BY_DAY)
         parts.append(
             f"with {row['days']} own days {row['mean']:.3f} instead of {row['reference']:.3f},"
             f" better in {_better(row, task)} of {row['pairs']} homes (log loss over their days"
@@ -188,8 +185,8 @@ def draw(study: Study, task: str) -> "Figure":
     days = sorted(frame["days"].unique().to_list())
     for panel, home in zip(panels, homes, strict=True):
         for number, (arm, own) in enumerate(_by_arm(frame.filter(home=home))):
-            color = COLORS[number % len(COLORS)] if arm != REFERENCE else DARK
-            x = [days.index(value) for value in own["days"].to_list()]
+            color = DARK if arm == REFERENCE else COLORS[number % len(COLORS)]
+            x = list(map(days.index, own["days"]))
             style = {"color": color, "marker": MARKERS[number], "ms": 4, "lw": 1.2}
             panel.plot(x, own[metric].to_list(), label=arm, **style)
         panel.set_xticks(range(len(days)), [str(value) for value in days])
@@ -197,12 +194,12 @@ def draw(study: Study, task: str) -> "Figure":
         panel.set_xlabel("days of its own", fontsize=8)
         panel.spines[["top", "right"]].set_visible(False)
     panels[0].set_ylabel(f"{task}: {metric.replace('_', ' ')}", fontsize=8)
-    handles: dict[str, Any] = {}
+    handle_of: dict[str, Any] = {}
     for panel in panels:
-        handles |= dict(zip(*panel.get_legend_handles_labels()[::-1], strict=True))
-    figure.legend(
-        handles.values(), handles, loc="outside lower center", ncols=9, frameon=False, fontsize=8
-    )
+        handles, labels = panel.get_legend_handles_labels()
+        handle_of |= dict(zip(labels, handles, strict=True))
+    style = {"loc": "outside lower center", "ncols": 9, "frameon": False, "fontsize": 8}
+    figure.legend(handle_of.values(), handle_of, **style)
     return figure
 
 

@@ -1,7 +1,6 @@
 """Days of people by minutes: kinds of rooms, sensors that fired last, and classes of activities."""
 
 import re
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta
@@ -25,7 +24,9 @@ SIMILAR = {
     "child_room": "bedroom", "guest_room": "bedroom",
     **dict.fromkeys(("entryway", "hallway", "hall", "corridor", "lobby", DOOR), "entry"),
 }  # fmt: skip
-ENTRY, OTHER, OUT = KINDS.index("entry"), KINDS.index("other"), KINDS.index(AWAY)
+ENTRY = KINDS.index("entry")
+OTHER = KINDS.index("other")
+OUT = KINDS.index(AWAY)
 UNKNOWN = -1
 CLASSES = ("out", "sleep", "toilet", "wash", "food", "leisure", "other")
 # A name is of the first class with a word that begins one of its words.
@@ -111,7 +112,7 @@ def trace_of_log(
     states, seconds = read_seconds(log, rooms)
     codes = np.array([*(code_of(state.place) for state in states), UNKNOWN], np.int16)
     known = codes[seconds]
-    minutes = by_minute(_held(known), len(KINDS)).ravel()
+    minutes = by_minute(_held(known, ENTRY), len(KINDS)).ravel()
     classes = [_class_of_state(state, activities) for state in states]
     doing = by_minute(np.array([*classes, UNKNOWN], np.int16)[seconds], len(CLASSES)).ravel()
     weekday = log.first_day.weekday() if log.first_day else 0
@@ -127,11 +128,11 @@ def _class_of_state(state: ActivityPlace, activities: dict[str, str]) -> int:
     return CLASSES.index(name)
 
 
-def _held(codes: I16) -> I16:
-    """Return codes in which passages are taken for the room before them."""
-    at = np.where(codes == ENTRY, 0, np.arange(len(codes)))
+def _held(codes: I16, ignored: int) -> I16:
+    """Return codes in which one, such as that of passages, is replaced by the code before it."""
+    at = np.where(codes == ignored, 0, np.arange(len(codes)))
     held = codes[np.maximum.accumulate(at)]
-    return np.where(held == ENTRY, UNKNOWN, held).astype(np.int16)
+    return np.where(held == ignored, UNKNOWN, held).astype(np.int16)
 
 
 def _fired(log: ActivityLog, rooms: dict[str, str], minutes: int) -> I16:
@@ -139,16 +140,16 @@ def _fired(log: ActivityLog, rooms: dict[str, str], minutes: int) -> I16:
     sensors = replace(log, readings=log.sensors or log.readings)
     known = {label: kind for label, kind in rooms.items() if label in sensors.rooms}
     kinds = kinds_of(sensors, known)
-    events = sorted(
-        (at_us, code_of(kind[0]))
-        for reading in sensors.readings
-        if (kind := kinds[reading.room]) is not None and kind[0] != AWAY
-        for at_us in {reading.begin_us, reading.end_us}
-    )
-    times = [at_us for at_us, _ in events]
+    events = []
+    for reading in sensors.readings:
+        kind = kinds[reading.room]
+        if kind is not None and kind[0] != AWAY:
+            events += [(at_us, code_of(kind[0])) for at_us in (reading.begin_us, reading.end_us)]
+    events.sort()
+    times_us = [at_us for at_us, _ in events]
     codes = np.array([*(code for _, code in events), UNKNOWN], np.int16)
-    ends = (np.arange(minutes) + 1) * MICROSECONDS
-    return codes[[bisect_right(times, end) - 1 for end in ends.tolist()]]
+    ends_us = (np.arange(minutes) + 1) * MICROSECONDS
+    return codes[np.searchsorted(times_us, ends_us, side="right") - 1]
 
 
 def traces_of_data(data: Dataset) -> Iterator[MinuteTrace]:
@@ -160,13 +161,7 @@ def traces_of_data(data: Dataset) -> Iterator[MinuteTrace]:
         classes = np.array([CLASSES.index(class_of(name or "")) for name in labels["activity"]])
         doing = np.where(codes == OUT, CLASSES.index("out"), classes[:count]).astype(np.int16)
         weekday = labels["time"][0].astype("datetime64[D]").astype(object).weekday()
-        yield MinuteTrace.of(_held(codes), _last_at_home(codes), doing, weekday)
-
-
-def _last_at_home(codes: I16) -> I16:
-    at = np.where(codes == OUT, 0, np.arange(len(codes)))
-    last = codes[np.maximum.accumulate(at)]
-    return np.where(last == OUT, UNKNOWN, last).astype(np.int16)
+        yield MinuteTrace.of(_held(codes, ENTRY), _held(codes, OUT), doing, weekday)
 
 
 def copied(trace: MinuteTrace, days: Any, count: int, seed: int) -> MinuteTrace:

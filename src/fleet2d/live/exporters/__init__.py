@@ -7,7 +7,7 @@ arguments.
 
 import importlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
@@ -265,6 +265,11 @@ def format_of(path: Path) -> str:
             f" write a file with one of {suffixes}, .txt, .db, or a folder"
         )
     return name
+
+
+def words_of(row: Mapping[str, Any]) -> str:
+    """Return the user and the details of an event, as far as it has them."""
+    return " ".join(str(row[key]) for key in ("user", "detail") if row.get(key))
 
 
 @contextmanager

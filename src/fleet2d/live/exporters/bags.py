@@ -103,11 +103,13 @@ class McapWriter:
         self._channels: dict[str, int] = {}
         definitions = []
         for number, (topic, definition) in enumerate(topics, 1):
-            self._channels[topic.name], code = number, struct.pack("<H", number)
+            self._channels[topic.name] = number
+            code = struct.pack("<H", number)
             texts = map(_text, (topic.type, "ros2msg", definition))
             qos = _map(_text(key) + _text(value) for key, value in _metadata(topic).items())
+            channel = (code, code, _text(topic.name), _text("cdr"), qos)
             definitions.append(_record(SCHEMA, code, *texts))
-            definitions.append(_record(CHANNEL, code, code, _text(topic.name), _text("cdr"), qos))
+            definitions.append(_record(CHANNEL, *channel))
         self._definitions = b"".join(definitions)
         self.chunks: list[WrittenChunk] = []
         self.counts: Counter[str] = Counter()
@@ -139,8 +141,12 @@ class McapWriter:
         length = self._at - at
         indices = {}
         for topic, channel in self._channels.items():
-            if own := [i for i, block in enumerate(blocks) if block.topic == topic]:
-                pairs = [np.stack([blocks[i].times, places[i]], axis=-1) for i in own]
+            pairs = [
+                np.stack([block.times, begins_at], axis=-1)
+                for block, begins_at in zip(blocks, places, strict=True)
+                if block.topic == topic
+            ]
+            if pairs:
                 index = np.concatenate(pairs)
                 index = index[np.argsort(index[:, 1])].astype("<u8")
                 head = struct.pack("<HI", channel, index.nbytes)
@@ -153,12 +159,12 @@ class McapWriter:
         topic = blocks[0].topic
         times = np.concatenate([block.times for block in blocks])
         heads = np.empty(len(times), MESSAGE_HEAD)
-        heads["record"], heads["channel"] = MESSAGE, self._channels[topic]
+        heads["record"] = MESSAGE
+        heads["channel"] = self._channels[topic]
         sizes = np.concatenate([block.sizes for block in blocks])
         heads["length"] = sizes - 9  # without the code and the length
-        heads["sequence"][np.argsort(times, kind="stable")] = (
-            np.arange(len(times)) + self.counts[topic]
-        )
+        order = np.argsort(times, kind="stable")
+        heads["sequence"][order] = np.arange(len(times)) + self.counts[topic]
         heads["logged"] = heads["published"] = times
         self.counts[topic] += len(times)
         ends = np.cumsum([len(block.times) for block in blocks])
@@ -184,25 +190,32 @@ class McapWriter:
         numbers = (self.counts.total(), channels, channels, 0, 0, chunks, begins, ends)
         self._put(_record(STATISTICS, struct.pack("<QHIIIIQQ", *numbers), _numbers(counts)))
         for chunk in self.chunks:
-            self._put(
-                _record(
-                    CHUNK_INDEX,
-                    struct.pack("<QQQQ", chunk.begins, chunk.ends, chunk.at, chunk.length),
-                    _numbers(chunk.indices),
-                    struct.pack("<Q", chunk.indices_length),
-                    _text(COMPRESSION),
-                    struct.pack("<QQ", chunk.compressed, chunk.size),
-                )
+            index = _record(
+                CHUNK_INDEX,
+                struct.pack("<QQQQ", chunk.begins, chunk.ends, chunk.at, chunk.length),
+                _numbers(chunk.indices),
+                struct.pack("<Q", chunk.indices_length),
+                _text(COMPRESSION),
+                struct.pack("<QQ", chunk.compressed, chunk.size),
             )
+            self._put(index)
         self._put(_record(FOOTER, struct.pack("<QQI", summary, 0, 0)), MAGIC)
 
 
 def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
     """Return the messages of some blocks in order of time, and where those of each are then."""
     rows = _alike(blocks)
-    times = np.concatenate([blocks[row[0]].times for row in rows])
-    sizes = np.concatenate([sum(blocks[i].sizes for i in row) for row in rows])
-    number = np.repeat(np.arange(len(rows)), [len(blocks[row[0]].times) for row in rows])
+    times_by_row = []
+    sizes_by_row = []
+    data = []
+    for row in rows:
+        beside = [blocks[i] for i in row]
+        times_by_row.append(beside[0].times)
+        sizes_by_row.append(sum(block.sizes for block in beside))
+        data.append(_side_by_side(beside).data)
+    times = np.concatenate(times_by_row)
+    sizes = np.concatenate(sizes_by_row)
+    number = np.repeat(np.arange(len(rows)), list(map(len, times_by_row)))
     order = np.argsort(times, kind="stable")
     places = np.empty(len(order), np.int64)
     places[order] = np.cumsum(sizes[order]) - sizes[order]
@@ -212,7 +225,6 @@ def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
     # What is next to each other in a row and in time is one piece.
     piece = np.flatnonzero(np.diff(number[order], prepend=-1))
     last = order[np.append(piece[1:], len(order)) - 1]
-    data = [_side_by_side([blocks[i] for i in row]).data for row in rows]
     begins = own[order[piece]].tolist()
     ends = (own[last] + sizes[last]).tolist()
     pieces = zip(number[order[piece]].tolist(), begins, ends, strict=True)

@@ -7,14 +7,15 @@ with `ph` (X: a slice of duration `dur`, i: an instant, C: a counter, M: a name)
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from fleet2d.engine.repeat import decisions_of
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.interactions.interaction import OUTCOMES
-from fleet2d.live.exporters import Records, Selection, new_file
-from fleet2d.runs.robot_log import decision_text, moves_of, rows_of
+from fleet2d.live.exporters import Records, Selection, new_file, words_of
+from fleet2d.runs.robot_log import Move, decision_text, moves_of, rows_of
 from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
 
@@ -102,11 +103,7 @@ def _trace(records: Records, decisions: Any) -> Iterator[dict[str, Any]]:
         if decisions is not None and kind == "robot":
             slices += _plans(rows_of(decisions, name, part.first, part.end), part.end)
         if "key_frames" in run.tables:
-            for move in moves_of(run, name, part.first, part.end):
-                args = {"from": move.begins_in, "to": move.ends_in, "metres": round(move.metres, 2)}
-                slices.append(
-                    Slice("motion", move.first, move.end, f"to {move.ends_in or 'outside'}", args)
-                )
+            slices += map(_motion, moves_of(run, name, part.first, part.end))
         for each in sorted(slices, key=lambda each: (each.first, each.track)):
             yield {
                 "ph": "X", "pid": pid, "tid": TRACKS.index(each.track) + 1,
@@ -116,12 +113,13 @@ def _trace(records: Records, decisions: Any) -> Iterator[dict[str, Any]]:
         yield from _instants(rows, pid, us)
 
 
+def _motion(move: Move) -> Slice:
+    args = {"from": move.begins_in, "to": move.ends_in, "metres": round(move.metres, 2)}
+    return Slice("motion", move.first, move.end, f"to {move.ends_in or 'outside'}", args)
+
+
 def _named(pid: int, tid: int, what: str, name: str) -> dict[str, Any]:
     return {"ph": "M", "pid": pid, "tid": tid, "ts": 0, "name": what, "args": {"name": name}}
-
-
-def _words(row: Mapping[str, Any]) -> str:
-    return " ".join(str(row[key]) for key in ("user", "detail") if row.get(key))
 
 
 def _event_slices(rows: Iterable[Mapping[str, Any]], end: int) -> Iterator[Slice]:
@@ -142,9 +140,11 @@ def _event_slices(rows: Iterable[Mapping[str, Any]], end: int) -> Iterator[Slice
 
 def _closed(track: str, row: Mapping[str, Any], end: int, ended_by: str) -> Slice:
     kind = row["event"]
-    words = _words(row)
+    words = words_of(row)
     name = words if kind == EventKind.ACTIVITY else f"{kind} {words}".strip()
-    args = {"step": row["step"], "detail": words} | ({"ended_by": ended_by} if ended_by else {})
+    args = {"step": row["step"], "detail": words}
+    if ended_by:
+        args["ended_by"] = ended_by
     return Slice(track, row["step"], end, name, args)
 
 
@@ -156,7 +156,7 @@ def _sights(rows: Iterable[Mapping[str, Any]], end: int) -> Iterator[Slice]:
         kind = row["event"]
         if kind not in (EventKind.USER_SEEN, EventKind.USER_LOST):
             continue
-        who = _words(row) or "unknown"
+        who = words_of(row) or "unknown"
         if since and row["step"] > begin:
             yield Slice("sight", begin, row["step"], ", ".join(since), {"step": begin})
         begin = row["step"]
@@ -170,21 +170,17 @@ def _sights(rows: Iterable[Mapping[str, Any]], end: int) -> Iterator[Slice]:
 
 def _plans(rows: list[dict[str, Any]], end: int) -> Iterator[Slice]:
     """Yield a slice for each decision of a robot, up to one that differs."""
-    begun = [row for i, row in enumerate(rows) if not i or _differ(row, rows[i - 1])]
-    ends = [*(row["step"] for row in begun[1:]), end]
-    for row, until in zip(begun, ends, strict=True):
-        args = {"step": row["step"], "reason": row["reason"]}
-        yield Slice("plan", row["step"], until, decision_text(row), args)
-
-
-def _differ(row: Mapping[str, Any], last: Mapping[str, Any]) -> bool:
-    return decision_text(row) != decision_text(last)
+    begun = [next(same) for _, same in groupby(rows, decision_text)]
+    begins = [row["step"] for row in begun]
+    for row, (begin, until) in zip(begun, pairwise([*begins, end]), strict=True):
+        args = {"step": begin, "reason": row["reason"]}
+        yield Slice("plan", begin, until, decision_text(row), args)
 
 
 def _instants(rows: Iterable[Mapping[str, Any]], pid: int, us: int) -> Iterator[dict[str, Any]]:
     """Yield every event as an instant, and the charge as a counter."""
     for row in rows:
-        words = _words(row)
+        words = words_of(row)
         common = {"pid": pid, "tid": TRACKS.index("events") + 1, "ts": row["step"] * us}
         yield {
             **common, "ph": "i", "s": "t", "name": f"{row['event']} {words}".strip(),

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fleet2d.kernels import F64, I64, U8
-from fleet2d.live.exporters import Chunk, Records
+from fleet2d.live.exporters import Chunk, Records, words_of
 from fleet2d.live.ros.topics import (
     UNKNOWN,
     RosTopic,
@@ -121,9 +121,10 @@ class RosMessages:
             messages = []
             for topic, times, sizes, data in blocks:
                 ends = np.cumsum(sizes)
+                begins = ends - sizes + self._margin
                 content = data.tobytes()
-                places = zip(times.tolist(), (ends - sizes).tolist(), ends.tolist(), strict=True)
-                messages += [Message(t, topic, content[a + self._margin : b]) for t, a, b in places]
+                places = zip(times.tolist(), begins.tolist(), ends.tolist(), strict=True)
+                messages += [Message(t, topic, content[begin:end]) for t, begin, end in places]
             messages.sort(key=itemgetter(0))
             yield from messages
 
@@ -154,8 +155,9 @@ class RosMessages:
 
     def _block(self, topic: str, times: Sequence[int], messages: Sequence[bytes]) -> Block:
         margin = bytes(self._margin)
-        data = np.frombuffer(bytearray(b"".join([margin + m for m in messages])), np.uint8)
-        sizes = np.array([self._margin + len(message) for message in messages], np.int64)
+        with_margins = [margin + message for message in messages]
+        data = np.frombuffer(bytearray(b"".join(with_margins)), np.uint8)
+        sizes = np.array(list(map(len, with_margins)), np.int64)
         return Block(topic, np.array(times, np.int64), sizes, data)
 
     def _time(self, step: int) -> int:
@@ -246,10 +248,11 @@ class RosMessages:
         users = [*users, UNKNOWN]  # the code -1
         has_heading = "heading" in table.column_names
         heading = np.nan_to_num(table["heading"].to_numpy()) if has_heading else np.zeros(len(x))
-        is_new = (np.diff(step, prepend=-1) != 0) | (np.diff(robot, prepend=-1) != 0)
-        first = np.flatnonzero(is_new)
+        is_first = (np.diff(step, prepend=-1) != 0) | (np.diff(robot, prepend=-1) != 0)
+        first = np.flatnonzero(is_first)
         count = np.diff(first, append=len(step))
-        for of, size in np.unique(np.stack([robot[first], count], axis=-1), axis=0).tolist():
+        kinds = np.unique(np.stack([robot[first], count], axis=-1), axis=0)
+        for of, size in kinds.tolist():
             looks = first[(robot[first] == of) & (count == size)]
             rows = looks[:, None] + np.arange(size)  # (looks, people)
             people = user[rows]
@@ -295,8 +298,9 @@ class RosMessages:
 
     def _log_block(self, robot: str, entries: list[LogEntry], chunk: Chunk) -> Block:
         """Return the lines of a log in the steps of a chunk."""
-        first, end = (bisect_left(entries, step, key=attrgetter("step")) for step in chunk.steps)
-        own = entries[first:end]
+        begin, end = chunk.steps
+        step = attrgetter("step")
+        own = entries[bisect_left(entries, begin, key=step) : bisect_left(entries, end, key=step)]
         times = [self._time(entry.step) for entry in own]
         return self._block(f"/{robot}/log", times, [self._log(robot, entry) for entry in own])
 
@@ -313,12 +317,11 @@ class RosMessages:
 
     def log_entry(self, row: dict[str, Any]) -> bytes:
         """Return an event as an entry of a log: who, what, details."""
-        detail = " ".join(str(row[key]) for key in ("user", "detail") if row.get(key))
         fields = {
             "stamp": stamp_at(self._time(row["step"])),
             "level": _LEVELS,
             "name": row["entity"],
-            "msg": f"{row['event']} {detail}".strip(),
+            "msg": f"{row['event']} {words_of(row)}".strip(),
             "function": row["event"],
         }
         return self._encode("rcl_interfaces/msg/Log", fields)
@@ -339,8 +342,10 @@ class Template:
         floats = [1.2345678901234e200 * (i + 1) for i in range(values)]
         data = message(stamps, floats)
         self._bytes = np.frombuffer(data, np.uint8)
-        self._stamps = [data.index(struct.pack("<iI", *divmod(s, 1_000_000_000))) for s in stamps]
-        self._floats = [data.index(struct.pack("<d", value)) for value in floats]
+        packed_stamps = [struct.pack("<iI", *divmod(stamp, 1_000_000_000)) for stamp in stamps]
+        packed_floats = [struct.pack("<d", value) for value in floats]
+        self._stamps = list(map(data.index, packed_stamps))
+        self._floats = list(map(data.index, packed_floats))
 
     def fill(self, topic: str, times: I64, values: Sequence[F64], margin: int) -> Block:
         """Return messages with other times [ns] and numbers, each an array (n,)."""

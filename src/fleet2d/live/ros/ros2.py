@@ -180,9 +180,8 @@ class Ros2Peer(Peer):
 
     def _begin(self, robot: str, goal: ActionGoal) -> bool:
         """Pass a goal on, if it is one: whether the robot gets there is its result."""
-        contents = list(
-            self._poses_of(robot, "goal", f"{robot}: navigate_to_pose", goal.fields["pose"])
-        )
+        topic = f"{robot}: navigate_to_pose"
+        contents = list(self._poses_of(robot, "goal", topic, goal.fields["pose"]))
         for content in contents:
             self._post({**content, "id": goal.id} if isinstance(content, dict) else content)
         return isinstance(contents[-1], dict)

@@ -77,8 +77,9 @@ class RosTopics:
         self._tf = RosTopic("/tf", "tf2_msgs/msg/TFMessage")
         self._static = RosTopic("/tf_static", "tf2_msgs/msg/TFMessage", is_latched=True)
         self._robots = {name: self._topics_of(name) for name in simulation.scenario.robots}
-        shared = [self._clock, self._map, self._static, self._tf]
-        self.all = [*shared, *(t for topics in self._robots.values() for t in topics.values())]
+        self.all = [self._clock, self._map, self._static, self._tf]
+        for topics in self._robots.values():
+            self.all += topics.values()
 
     def _topics_of(self, robot: str) -> dict[str, RosTopic]:
         types = {
@@ -120,14 +121,16 @@ class RosTopics:
         step = frame.step
         yield self._clock, {"clock": self.stamp(step)}
         present = {name: body for name, body in frame.bodies.items() if not body["away"]}
-        yield self._tf, {"transforms": [self._moved(step, *item) for item in present.items()]}
+        moved = [self._moved(step, name, body) for name, body in present.items()]
+        yield self._tf, {"transforms": moved}
+        observations = [row for table, row in frame.rows if table == "observations"]
         for robot, topics in self._robots.items():
             if robot in present:
                 yield topics["odom"], self._odometry(step, robot, present[robot])
                 yield topics["scan"], self._scan(step, robot, present[robot])
             if "battery_state" in topics:
                 yield topics["battery_state"], self._battery(step, robot)
-            seen = [r for t, r in frame.rows if t == "observations" and r["robot"] == robot]
+            seen = [row for row in observations if row["robot"] == robot]
             if seen:
                 yield topics["detections"], self._detections(step, seen)
                 yield topics["people"], self._people(step, seen)
@@ -178,15 +181,16 @@ class RosTopics:
         level = float(course.levels(moment)[0])
         piece = int(np.searchsorted(course.begins, moment[0], side="right")) - 1
         rate = course.rates[piece]
-        is_full = rate > 0 and level >= 1
-        state = _NOT_CHARGING if is_full else _CHARGING if rate > 0 else _DISCHARGING
+        state = _DISCHARGING
+        if rate > 0:
+            state = _NOT_CHARGING if level >= 1 else _CHARGING
+        unknown = ("voltage", "temperature", "current", "charge", "capacity", "design_capacity")
         return {
             "header": self._header(step, self.frame(robot, "base_link")),
             "percentage": level,
             "power_supply_status": state,
             "present": True,
-            **dict.fromkeys(("voltage", "temperature", "current", "charge"), math.nan),
-            **dict.fromkeys(("capacity", "design_capacity"), math.nan),
+            **dict.fromkeys(unknown, math.nan),
         }
 
     def _detections(self, step: int, rows: list[Any]) -> dict[str, Any]:
@@ -198,15 +202,13 @@ class RosTopics:
         return {"header": header, "detections": detections}
 
     def _people(self, step: int, rows: list[Any]) -> dict[str, Any]:
-        people = [
-            {
-                "name": row["user"] or UNKNOWN,
-                "position": vector(row["x"], row["y"]),
-                "velocity": vector(),
-                "reliability": 1.0,
-            }
-            for row in rows
-        ]
+        people = []
+        for row in rows:
+            name = row["user"] or UNKNOWN
+            position = vector(row["x"], row["y"])
+            velocity = vector()
+            person = {"name": name, "position": position, "velocity": velocity, "reliability": 1.0}
+            people.append(person)
         return {"header": self._header(step, "map"), "people": people}
 
     def _header(self, step: int, frame: str) -> dict[str, Any]:
@@ -294,16 +296,16 @@ def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:
     if not len(pieces[0]):
         return np.zeros(BEAMS)
     ends = region_outline(walls, x, y, *pieces)[0].reshape(-1, 2, 2) - np.array([x, y])
-    right, left = ends[:, 0], ends[:, 1]
+    right = ends[:, 0]
+    left = ends[:, 1]
     turn = 2 * math.pi
     angles = heading - math.pi + turn / BEAMS * np.arange(BEAMS)
     begins = np.arctan2(right[:, 1], right[:, 0]) % turn
     order = np.argsort(begins, kind="stable")
     piece = order[np.searchsorted(begins[order], angles % turn, side="right") - 1]
-    direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    wall = (left - right)[piece]
-    across = direction[:, 0] * wall[:, 1] - direction[:, 1] * wall[:, 0]
-    start = right[piece]
-    along = start[:, 0] * wall[:, 1] - start[:, 1] * wall[:, 0]
+    wall_x, wall_y = (left - right)[piece].T
+    start_x, start_y = right[piece].T
+    across = np.cos(angles) * wall_y - np.sin(angles) * wall_x
+    along = start_x * wall_y - start_y * wall_x
     distance: F64 = np.abs(along / np.where(across == 0, np.inf, across))
     return distance

@@ -132,8 +132,11 @@ class ZenohAction:
             for goal in chosen:
                 goal.status = ActionStatus.CANCELING
             is_known = name in self._goals
-        is_done = bool(chosen) or is_all or bool(until)
-        code = _NONE if is_done else _IS_OVER if is_known else _UNKNOWN_GOAL
+        code = _UNKNOWN_GOAL
+        if chosen or is_all or until:
+            code = _NONE
+        elif is_known:
+            code = _IS_OVER
         reply({"return_code": code, "goals_canceling": [goal.info for goal in chosen]})
         for goal in chosen:
             self._cancel(goal)
