@@ -51,6 +51,23 @@ class PendingReply(NamedTuple):
     reply: Reply
 
 
+class DueStart(NamedTuple):
+    """Something that a person starts with a robot at a step: a call, a question, a complaint."""
+
+    step: int
+    user: int
+    robot: int
+    kind: str
+
+
+class RoomBan(NamedTuple):
+    """A room that a robot keeps out of, until it may enter at a step."""
+
+    until: int
+    robot: int
+    room: int
+
+
 class Conversations(Watcher):
     """All questions and answers of a run; it does nothing if nobody wants anything.
 
@@ -88,11 +105,11 @@ class Conversations(Watcher):
         self._agenda = 0  # the next step with an answer, the end of a ban, or what people start
         self._changes: dict[int, dict[str, int]] = {}  # of each queue: when requests come up next
         self._initiators: list[tuple[int, int]] = []  # users who start something, and robots
-        self._starts: list[tuple[int, int, int, str]] = []  # today: step, user, robot, kind
+        self._starts: list[DueStart] = []  # today
         self._begun_days = 0
         # By robot: what was accepted last, and when.
         self._accepted: dict[int, tuple[Request, int]] = {}
-        self._bans: list[tuple[int, int, int]] = []  # first step without, robot, room
+        self._bans: list[RoomBan] = []
         self._open(basis)
 
     def _open(self, basis: Basis) -> None:
@@ -150,8 +167,8 @@ class Conversations(Watcher):
     def _look_ahead(self) -> None:
         """Note when anything happens next that doesn't depend on the plans of robots."""
         steps = [NEVER, *(reply.step for reply in self._replies)]
-        steps += [start[0] for start in self._starts]
-        steps += [ban[0] for ban in self._bans]
+        steps += [start.step for start in self._starts]
+        steps += [ban.until for ban in self._bans]
         if self._initiators:
             steps.append(self._day_begin(self._begun_days))
         self._agenda = max(min(steps), self.next_step)
@@ -385,7 +402,7 @@ class Conversations(Watcher):
         if lasts is not None and room is not None:
             until = step + self._steps_in(lasts)
             robot.keep_out(room, step + 1, until, text)
-            self._bans.append((until, row, room))
+            self._bans.append(RoomBan(until, row, room))
             text = f"{text} {robot.home.rooms[room].name}"
         if outcome == Outcome.SWITCHED_OFF:
             for_good = answers.has_enough(self.attitudes[user, row])
@@ -422,7 +439,8 @@ class Conversations(Watcher):
             state = self.attitudes[user, row]
             self.answers[user].months.pass_time(state, time)
             self.answers[user].months.let_down(state)
-            is_answered = note.event != EventKind.ASKS or since * self._clock.step_us > note.time_us
+            since_us = since * self._clock.step_us
+            is_answered = note.event != EventKind.ASKS or since_us > note.time_us
             if accepted is not None and is_answered:
                 self.queues[row].reopen(accepted, time)
             events.append(Event(step, robot.name, EventKind.BROKEN_OFF, note.detail))
@@ -434,8 +452,8 @@ class Conversations(Watcher):
 
     def _end_bans(self, step: int) -> list[Event]:
         """End the bans of rooms that are over at a step."""
-        ended = [ban for ban in self._bans if ban[0] <= step]
-        self._bans = [ban for ban in self._bans if ban[0] > step]
+        ended = [ban for ban in self._bans if ban.until <= step]
+        self._bans = [ban for ban in self._bans if ban.until > step]
         events = []
         for until, row, room in ended:
             robot = self.actors[row]
@@ -460,18 +478,19 @@ class Conversations(Watcher):
                 for start in self.answers[user].initiative.starts(draws):
                     at = self._step_of(midnight + start.day_share * DAY)
                     if at > step:
-                        self._starts.append((at, user, row, start.kind))
+                        self._starts.append(DueStart(at, user, row, start.kind))
             self._begun_days += 1
             self._starts.sort()
-        due = [start for start in self._starts if start[0] <= step]
+        due = [start for start in self._starts if start.step <= step]
         self._starts = self._starts[len(due) :]
         events: list[Event] = []
-        for _, user, row, kind in due:
-            events += self._turn_to(user, row, kind, step, bodies)
+        for due_start in due:
+            events += self._turn_to(due_start, step, bodies)
         return events
 
-    def _turn_to(self, user: int, row: int, kind: str, step: int, bodies: Bodies) -> list[Event]:
+    def _turn_to(self, start: DueStart, step: int, bodies: Bodies) -> list[Event]:
         """Let a person call a robot, ask it something, or complain; return what happens."""
+        _, user, row, kind = start
         person = self.actors[user]
         robot = self.actors[row]
         block = bodies.block(step, step + 1)

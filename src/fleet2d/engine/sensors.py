@@ -156,10 +156,12 @@ class Sensors(Watcher):
 
     def events_of(self, rows: Iterable[SensorRow]) -> list[Event]:
         """Return readings as events, with the sensor and its state in the words of the table."""
+        names = self.names
+        kind = EventKind.SENSOR
         events = []
         for row in rows:
             word = self.words[row.sensor][not row.on]
-            events.append(Event(row.step, self.names[row.sensor], EventKind.SENSOR, word))
+            events.append(Event(row.step, names[row.sensor], kind, word))
         return events
 
     def take_events(self, events: Sequence[Event]) -> None:

@@ -84,8 +84,7 @@ class Arbiter:
         is_due = events <= self._preempting_events if events else self.wake_step == now.step
         if self.active is None or plan.is_over(now.step) or not is_due:
             return False
-        active = self.behaviors[self.active]
-        if active.when and not active.busy() and not self._hours_of(self.active, now.time)[1]:
+        if self._minds_hours(self.active) and not self._hours_of(self.active, now.time)[1]:
             return False
         for number in range(self.active):
             if self.behaviors[number].preempts and self._may_decide(number, now):
@@ -127,10 +126,10 @@ class Arbiter:
             self.own = plan.interrupts
         times: list[datetime | None] = []
         events = self.own
-        active = None if self.active is None else self.behaviors[self.active]
-        if self.active is not None and active is not None and active.when and not active.busy():
+        if self.active is not None and self._minds_hours(self.active):
             ends, holds_now = self._hours_of(self.active, now.time)
-            times += [ends] * holds_now
+            if holds_now:
+                times.append(ends)
         for number, behavior in enumerate(self.behaviors[: self.active]):
             if not behavior.preempts or number in self.off:
                 continue
@@ -184,6 +183,11 @@ class Arbiter:
             until = min(span.next_begin(time) for span in when) if end is None else end
             self._hours[number] = time, until, holds_now
         return until, holds_now
+
+    def _minds_hours(self, number: int) -> bool:
+        """Return whether a behavior ends with its hours."""
+        behavior = self.behaviors[number]
+        return bool(behavior.when) and not behavior.busy()
 
     def _activate(self, number: int | None, now: Situation, plan: Plan) -> None:
         """Make a behavior the active one; the plan of the one before may be resumed later."""

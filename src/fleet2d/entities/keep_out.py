@@ -103,7 +103,8 @@ class TimedZones(NamedTuple):
     def about(self) -> str:
         """When it does, for notes."""
         hours = ", ".join(span.text for span in self.during)
-        return f" {hours}" * bool(hours) + " while somebody sleeps" * self.asleep
+        about = f" {hours}" if hours else ""
+        return f"{about} while somebody sleeps" if self.asleep else about
 
 
 class KeepOutRules:
@@ -189,7 +190,8 @@ class SleepMemory:
     @property
     def rooms(self) -> frozenset[int]:
         """The rooms in which it believes that somebody sleeps."""
-        return frozenset(room for room, lies in self._last.values() if lies and room is not None)
+        lying_in = (room for room, lies in self._last.values() if lies)
+        return frozenset(room for room in lying_in if room is not None)
 
     def take(self, step: I64, index: I32, distinct: I64) -> None:
         """Add sightings; see `fleet2d.algorithms.observations.SightingTable`."""
@@ -197,5 +199,5 @@ class SleepMemory:
         last[index] = np.arange(len(index))
         for row in distinct[np.argsort(last, kind="stable")].tolist():
             room = self._plan.room_of_point(row[Column.X], row[Column.Y])
-            lies = row[Column.POSTURE] == LYING
-            self._last[row[Column.IDENTITY]] = None if room is None else room.index, lies
+            number = None if room is None else room.index
+            self._last[row[Column.IDENTITY]] = number, row[Column.POSTURE] == LYING

@@ -225,10 +225,8 @@ class _Merger:
             # The type of an algorithm or a metric may be given by its name.
             old = base.get("type", keys[-1])
             new = change["type"]
-            if old != new:  # equal names need no class, which may be the user's code
-                cls = _class_of(kind, old)
-                if cls is None or cls is not _class_of(kind, new):
-                    old_fields = {"behaviors", *_type_fields(kind, old)}
+            if not _is_same_class(kind, old, new):
+                old_fields = {"behaviors", *_type_fields(kind, old)}
         for key in old_fields & base.keys():
             self.forget(base[key], (*keys, key))
         return {key: value for key, value in base.items() if key not in old_fields}
@@ -255,6 +253,14 @@ def _class_of(kind: str, name: Any) -> type[Component] | None:
     with suppress(ScenarioError, TypeError):
         return lookup(kind, name)
     return None
+
+
+def _is_same_class(kind: str, one: Any, other: Any) -> bool:
+    """Return whether two names of types stand for one class."""
+    if one == other:  # without the class, which may be the user's code
+        return True
+    cls = _class_of(kind, one)
+    return cls is not None and cls is _class_of(kind, other)
 
 
 def _type_fields(kind: str, name: Any) -> set[str]:

@@ -133,24 +133,26 @@ def _share(definitions: dict[str, Any], owner: str, key: str, heirs: Sequence[st
     for name in heirs:
         properties = definitions[name]["properties"]
         if name != owner and properties[key] == content:
-            properties[key] = _reference(owner, key)
+            properties |= _references(owner, [key])
 
 
-def _reference(owner: str, key: str) -> dict[str, str]:
-    return {"$ref": f"#/$defs/{owner}/properties/{key}"}
+def _references(owner: str, keys: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Return keys whose schemas are those of a class."""
+    return {key: {"$ref": f"#/$defs/{owner}/properties/{key}"} for key in keys}
 
 
 def _by_verb(
     verb: str, subject: str, name: str, act: Mapping[str, Any], times: Iterable[str]
 ) -> dict[str, Any]:
     """Return the schema of an entry of a script: its verb, the time, and the other keys."""
-    keys = {verb if key == subject else key: _reference(name, key) for key in act["properties"]}
+    keys = _references(name, act["properties"])
+    keys = {verb if key == subject else key: reference for key, reference in keys.items()}
     required = [key for key in act.get("required", ()) if key != subject]
     return {
         "title": verb,
         "description": act.get("description", ""),
         "type": "object",
-        "properties": keys | {key: _reference("Entry", key) for key in times},
+        "properties": keys | _references("Entry", times),
         "required": [verb, *required],
         "additionalProperties": False,
     }
@@ -181,10 +183,15 @@ def _expand(
         body = str(result["anyOf"][0]["$ref"]).rpartition("/")[2]
         keys = definitions[body]["properties"].keys() - {"behaviors"}
         for title, name in kinds[kind].items():
-            own = {key: _reference(name, key) for key in definitions[name]["properties"]}
-            properties = own | {key: _reference(body, key) for key in sorted(keys)}
-            form = {"title": title, "type": "object", "additionalProperties": False}
-            result["anyOf"].append({**form, "properties": properties, "required": ["type"]})
+            own = _references(name, definitions[name]["properties"])
+            form = {
+                "title": title,
+                "type": "object",
+                "additionalProperties": False,
+                "properties": own | _references(body, sorted(keys)),
+                "required": ["type"],
+            }
+            result["anyOf"].append(form)
         result["anyOf"] += _forms_without_fields(kind, kinds[kind])
     return result
 

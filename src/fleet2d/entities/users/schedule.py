@@ -1,6 +1,7 @@
 """Schedule: a fixed daily or weekly agenda of places."""
 
 from datetime import datetime, timedelta
+from itertools import chain
 from typing import NamedTuple
 
 from pydantic import Field
@@ -104,8 +105,8 @@ class Schedule(Behavior):
         """Refuse days that overlap, are not in order, or are all replaced by later ones."""
         for number, day in enumerate(self.days):
             _entries(day, self.rest, number)
-            later = {weekday for other in self.days[number + 1 :] for weekday in other.weekdays}
-            if day.weekdays <= later:
+            others = self.days[number + 1 :]
+            if day.weekdays <= frozenset().union(*(other.weekdays for other in others)):
                 raise problem_at(
                     ("days", number),
                     "later entries of the list replace it on each of its days: list those of more"
@@ -117,7 +118,8 @@ class Schedule(Behavior):
         self.week = self._week()
         self.plan: Plan | None = None  # the last one that it returned
         self.until = actor.clock.start  # the midnight at which that plan ends
-        places = dict.fromkeys(entry.place for day in self.week for entry in day if entry.place)
+        entries = chain.from_iterable(self.week)
+        places = dict.fromkeys(entry.place for entry in entries if entry.place)
         for place in places:
             if is_point(place):
                 actor.point(place)  # type: ignore[arg-type]
@@ -154,11 +156,12 @@ class Schedule(Behavior):
 
     def activities(self) -> tuple[str, ...]:
         """Return the activities of its agendas."""
-        return tuple(dict.fromkeys(e.activity for day in self.week for e in day if e.activity))
+        names = (entry.activity for entry in chain.from_iterable(self.week))
+        return tuple(dict.fromkeys(filter(None, names)))
 
     def perform(self, plan: Plan, activity: str) -> None:
         """Go to where an activity is done: the first place that an agenda has for it."""
-        entries = (entry for day in self.week for entry in day)
+        entries = chain.from_iterable(self.week)
         place = next(entry.place for entry in entries if entry.activity == activity)
         if place:
             plan.come_home().go_to(place)
@@ -242,7 +245,8 @@ def _rest_later(week: list[list[AgendaEntry]]) -> None:
         moved = rest._replace(at=rest.at - days * DAY)
         target = week[(day + days) % 7]
         is_due_before = bool(target) and target[0].begins <= moved.begins
-        if not is_due_before and not any(week[(day + n) % 7] for n in range(1, days)):
+        between = (week[(day + ahead) % 7] for ahead in range(1, days))
+        if not is_due_before and not any(between):
             target.insert(0, moved)
 
 
