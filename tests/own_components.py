@@ -134,6 +134,22 @@ class Spy(Metric):
         return {"handed": self.handed}
 
 
+class Visited(Metric):
+    """The share of time in the bathroom, of who was there at all."""
+
+    def start(self, home: Home) -> None:
+        self.room = home.plan.room("bathroom_1").index
+        self.steps: dict[str, list[bool]] = {}
+
+    def update(self, history: History, state: Present) -> None:
+        for user in state.users:
+            there = history.poses(user).room == self.room
+            self.steps.setdefault(user, []).extend(there.tolist())
+
+    def result(self) -> dict[str, Any]:
+        return {user: sum(steps) / len(steps) for user, steps in self.steps.items() if any(steps)}
+
+
 class Impatient(Algorithm):
     """Presses Ctrl-C twice during an update."""
 

@@ -224,7 +224,8 @@ def test_a_search_at_the_end_of_the_run_is_censored():
     stay = {"type": "patrol", "waypoints": [[1.0, 3.0]]}
     cut["robots"]["astro"] |= {"battery": None, "behaviors": [find, stay]}
     result = run(cut).metrics["time_to_find"]["astro"]
-    assert {"searches": 1, "success": 0.0, "mean": 600.0, "spl": 0.0} == result
+    mistakes = {"false": 0, "false_out": 0}
+    assert {"searches": 1, "success": 0.0, "mean": 600.0, "spl": 0.0, **mistakes} == result
 
 
 def test_a_wrong_verdict_not_at_home_is_counted():

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import timedelta
 from itertools import pairwise
 from math import dist
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import Field
@@ -13,6 +13,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import AWAY
 from fleet2d.configuration.units import Length, PositiveDuration
+from fleet2d.entities.power import PowerState
 from fleet2d.floorplan.home import Home
 from fleet2d.metrics.metric import Metric, nested, pairs_of
 from fleet2d.runtime.clock import DAY_S
@@ -156,18 +157,17 @@ class BatteryUse(Metric):
         self.step_s = history.step_s
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {lowest, dockings, charging}}, and empty of those that ran empty."""
+        """Return {robot: {lowest, dockings, charging, empty}}."""
         numbers = {}
         for name, lowest in self.lowest.items():
             present = self.steps - self.docked_at[name] if name in self.docked_at else 0
+            empty = self.empty.get(name, 0) + self.steps - self.empty_at.get(name, self.steps)
             numbers[name] = {
                 "lowest": lowest,
                 "dockings": self.dockings.get(name, 0) / (self.steps * self.step_s / DAY_S),
                 "charging": (self.charging.get(name, 0) + present) / self.steps,
+                "empty": empty / self.steps,
             }
-            empty = self.empty.get(name, 0) + self.steps - self.empty_at.get(name, self.steps)
-            if empty:
-                numbers[name]["empty"] = empty / self.steps
         return numbers
 
 
@@ -196,13 +196,14 @@ class Uptime(Metric):
     def update(self, history: History, state: Present) -> Any:
         """Read the events; return the share of the period in which each robot was on."""
         off = dict.fromkeys(state.robots, 0)
+        reasons = [reason for reason in get_args(PowerState) if reason != "on"]
         for robot in state.robots:
-            self.times.setdefault(robot, {})
+            self.times.setdefault(robot, dict.fromkeys(reasons, 0))
             self.steps_off.setdefault(robot, [])
         for event in history.events:
             name = event.entity
             if event.event == EventKind.POWER_OFF:
-                self.times[name][event.detail] = self.times[name].get(event.detail, 0) + 1
+                self.times[name][event.detail] += 1
                 self.off_at[name] = event.step
             elif event.event == EventKind.POWER_ON:
                 began = self.off_at.pop(name)
@@ -223,8 +224,7 @@ class Uptime(Metric):
             still_off = [self.end - self.off_at[name]] if name in self.off_at else []
             steps = [*self.steps_off[name], *still_off]
             numbers[name] = {"on": 1 - sum(steps) / self.end}
-            if steps:
-                numbers[name]["longest"] = max(steps) * self.step_s
+            numbers[name]["longest"] = max(steps, default=0) * self.step_s
             numbers[name] |= {reason: count / self.days for reason, count in times.items()}
         return numbers
 
@@ -258,20 +258,21 @@ class RoomShare(Metric):
         }
 
     def result(self) -> dict[str, Any]:
-        """Return {user: {room: share}} for the rooms that the user was in."""
+        """Return {user: {room: share}} of all rooms, and away."""
         result = {}
         for user, steps in self.seconds.items():
-            shares = zip(self.names, (steps / steps.sum()).tolist(), strict=True)
-            result[user] = {room: share for room, share in shares if share}
+            shares = (steps / steps.sum()).tolist()
+            result[user] = dict(zip(self.names, shares, strict=True))
         return result
 
     @classmethod
     def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the places where each user is most of the time, the longest first."""
-        return {
-            user: dict(sorted(shares.items(), key=lambda item: -item[1])[:MAX_PLACES])
-            for user, shares in result.items()
-        }
+        places = {}
+        for user, shares in result.items():
+            most = sorted(shares.items(), key=lambda item: -item[1])[:MAX_PLACES]
+            places[user] = {room: share for room, share in most if share}
+        return places
 
 
 class Stays(Metric):

@@ -45,7 +45,10 @@ def block_of(metric: str, metric_class: type[Metric], result: Any) -> ResultTabl
     numbers = dict(_numbers(metric_class.summary(result)))
     depth = min(map(len, numbers), default=0)
     shown = {path: number for path, number in numbers.items() if len(path) == depth}
-    hidden = len(list(_numbers(result))) - len(shown)
+    everything = list(_numbers(result))
+    hidden = len(everything) - len(shown)
+    if not any(number for path, number in everything if path not in shown):
+        hidden = 0  # zeros alone say nothing more
     subjects = list(dict.fromkeys(path[:-1] for path in shown))
     measures = list(dict.fromkeys(path[-1:] for path in shown))
     has_names_alone = depth == 1 and not any(name in metric_class.units for (name,) in shown)

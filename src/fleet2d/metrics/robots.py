@@ -92,8 +92,7 @@ class ReachTime(Metric):
             if seconds:
                 numbers["mean"] = sum_in_order(seconds) / len(seconds)
                 numbers["p90"] = float(np.quantile(seconds, 0.9))
-            if self.unreached[robot, user]:
-                numbers["unreached"] = self.unreached[robot, user]
+            numbers["unreached"] = self.unreached[robot, user]
             results.setdefault(robot, {})[user] = numbers
         return results
 
@@ -275,12 +274,11 @@ class TimeToFind(Metric):
         until = self.deadline.total_seconds()
         at_home = [s for s in searches if s.at_home]
         away = [s for s in searches if not s.at_home]
-        numbers: dict[str, Any] = {"searches": len(searches)}
-        mistakes = {
+        numbers: dict[str, Any] = {
+            "searches": len(searches),
             "false": sum(s.end == "false" for s in searches),
             "false_out": sum(s.end == EventKind.NOT_AT_HOME for s in at_home),
         }
-        numbers |= {name: count for name, count in mistakes.items() if count}
         if at_home:
             finds = [s for s in at_home if s.end == EventKind.FOUND]
             curve = kaplan_meier(
