@@ -20,6 +20,7 @@ from fleet2d.viewing.tutorials import notebook_of
 
 FENCE = re.compile(r"^```(\w+)(?: title=(\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
+OWN_PAGE = re.compile(r"(?<![\w/])docs/[a-z_/-]+\.md")
 TEXTS = [
     pytest.param(page, id=str(page.relative_to(ROOT)))
     for page in sorted({*PAGES, *ROOT.glob("*.md")})
@@ -147,6 +148,18 @@ def test_command_of_a_page_exists_with_its_options(words):
         bundled = [word for word in words if word.startswith("bundled:")]
         scenario = "bundled:paper" if has_file else next(iter(bundled), None)
         assert load_scenario(scenario, *overrides) is not None
+
+
+def test_pages_that_files_name_exist():
+    """Pages were moved into folders, and eight files still named them by their old paths."""
+    names = ("src", "tests", "docs", "examples", "tools", "benchmarks")
+    files = [file for name in names for file in (ROOT / name).rglob("*.*")]
+    read = [file for file in files if file.suffix in (".py", ".md", ".yaml", ".toml")]
+    named = {name for file in read for name in OWN_PAGE.findall(file.read_text(encoding="utf-8"))}
+
+    assert {"docs/design.md"} == {
+        name for name in named if not (ROOT / name).exists()
+    }  # of Zenoh's
 
 
 @pytest.mark.parametrize("page", TEXTS)

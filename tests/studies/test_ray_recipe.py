@@ -47,7 +47,9 @@ class KillsANode(Observer):
 def test_a_node_that_dies_loses_only_what_it_ran(cluster, tmp_path, monkeypatch):
     # Runs take longer than a node takes to die: one that had just finished would lose nothing.
     study = small(base=base("4 days"), replicates=5)
-    (recipe,) = [each for each in blocks(ROOT / "docs/studies.md") if each.title == "ray_study.py"]
+    (recipe,) = [
+        each for each in blocks(ROOT / "docs/how-to/studies.md") if each.title == "ray_study.py"
+    ]
     (tmp_path / "ray_study.py").write_text(recipe.text, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     executor = importlib.import_module("ray_study").RayExecutor()

@@ -46,7 +46,7 @@ ASK_COLUMNS = (
     # The same in all rows
     *("hour_sin", "hour_cos", "weekend", "weeks"),
 )
-"""The columns of an observation, in their order: see docs/gym.md."""
+"""The columns of an observation, in their order: see docs/how-to/gym.md."""
 _AT = {name: number for number, name in enumerate(ASK_COLUMNS)}
 
 # The value of an interaction whose column `worth` is a half.
@@ -152,7 +152,7 @@ class AskPolicy(LearnedBehavior, Interact):
         return f"{names[row]}, which isn't open, or whose person has to be left alone for a while"
 
     def observe(self, now: Situation) -> F32:
-        """Return the observation, float32 (requests, columns): see docs/gym.md."""
+        """Return the observation, float32 (requests, columns): see docs/how-to/gym.md."""
         table = np.zeros((self.requests, len(ASK_COLUMNS)), np.float32)
         queue = now.requests
         if queue is None:

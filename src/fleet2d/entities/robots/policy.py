@@ -288,7 +288,7 @@ class LearnedBehavior(BeliefBehavior):
             open_network(self.file, INPUTS)
 
     def observe(self, now: Situation) -> F32:
-        """Return the observation, float32 (rows, columns): see docs/gym.md."""
+        """Return the observation, float32 (rows, columns): see docs/how-to/gym.md."""
         raise NotImplementedError
 
     def mask(self, now: Situation) -> Bool:
@@ -307,7 +307,7 @@ class LearnedBehavior(BeliefBehavior):
         """Return the action for an observation; override it for a policy of your own.
 
         Args:
-            observation: float32 (rows, columns), see docs/gym.md.
+            observation: float32 (rows, columns), see docs/how-to/gym.md.
             mask: bool (rows + 1,), the possible actions.
 
         Raises:
