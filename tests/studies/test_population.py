@@ -237,6 +237,16 @@ def test_a_column_that_is_almost_another_one_is_noted(tmp_path):
     assert note in "\n".join(plan_dataset({"base": BASE, "splits": {"train": split}}).left_out)
 
 
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_a_table_may_have_the_separators_and_commas_of_a_spreadsheet(tmp_path, mark):
+    lines = [("household", "robots.astro.speed", "weight"), ("retired", "0.3", "2")]
+    text = "\r\n".join(mark.join(line) for line in lines)
+    census = table(tmp_path, text if mark == "," else text.replace(".3", ",3"))
+    drawn = draw(table=census)
+    assert ("household", "robots.astro.speed") == drawn.table_columns
+    assert (0.3,) == tuple(drawn.life(0).labels[name] for name in drawn.columns)
+
+
 def test_lives_without_a_layout_are_left_out_and_counted_where_others_have_one(monkeypatch):
     """A fleet of 2,000 was refused, as for two of its homes no layout was found."""
     built = iter(range(100))

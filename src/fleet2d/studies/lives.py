@@ -5,12 +5,13 @@ Lives are drawn one after the other, so a larger population begins with the same
 
 import io
 import math
+import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -32,6 +33,9 @@ from fleet2d.studies.axes import (
 from fleet2d.studies.conditions import Condition, Range, condition_words, fulfils, read_condition
 from fleet2d.studies.households import bedrooms_needed, members_of, personas_of
 from fleet2d.studies.lazy import LazySequence
+
+if TYPE_CHECKING:
+    import polars as pl
 
 MAX_SEED = 1 << 31
 # The distance between the seeds of two populations, larger than a population.
@@ -425,13 +429,8 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
     """
     if settings.table is None:
         return [], [], []
-    with extra("study", "tables of a population need polars"):
-        import polars as pl
     path = settings.table
-    content = io.BytesIO(read_bytes(path, FILE_BYTES))
-    read = pl.read_parquet if path.suffix == ".parquet" else pl.read_csv
-    with errors_as(ScenarioError, str(path), of=pl.exceptions.PolarsError):
-        frame = read(content)
+    frame = _frame_of(path)
     weight = settings.weight
     if weight not in frame.columns and "weight" in settings.model_fields_set:
         raise ScenarioError(f"{path} has no column {weight!r}{suggest(weight, frame.columns)}")
@@ -455,6 +454,20 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
             if isinstance(value, str) and "." in key and _is_file(path.parent / value):
                 row[key] = str((path.parent / value).absolute())  # such as a log
     return rows, ends, frame.columns
+
+
+def _frame_of(path: Path) -> "pl.DataFrame":
+    """Return a table as polars reads it; CSV with the marks of spreadsheets of any language."""
+    with extra("study", "tables of a population need polars"):
+        import polars as pl
+    content = read_bytes(path, FILE_BYTES)
+    with errors_as(ScenarioError, str(path), of=pl.exceptions.PolarsError):
+        if path.suffix == ".parquet":
+            return pl.read_parquet(io.BytesIO(content))
+        head, _, body = content.partition(b"\n")
+        separator = max(",;\t", key=lambda mark: head.count(mark.encode()))
+        has_comma = separator != "," and re.search(rb"\d,\d", body) is not None
+        return pl.read_csv(io.BytesIO(content), separator=separator, decimal_comma=has_comma)
 
 
 def _is_file(path: Path) -> bool:
