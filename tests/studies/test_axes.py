@@ -57,7 +57,8 @@ def test_options_change_several_keys_each():
 def test_floor_plans_of_a_folder_are_called_by_their_files(tmp_path):
     for name in ("b", "a"):
         (tmp_path / f"{name}.json").write_text(json.dumps(flat_document()))
-    (tmp_path / "notes.txt").write_text("not a plan")
+    for hidden in ("notes.txt", "._a.json"):
+        (tmp_path / hidden).write_text("not a plan")
     x_axis = axis(floorplans=str(tmp_path), settings={"furnish": True})
     assert [("a",), ("b",)] == labels(x_axis)
     section = values(x_axis)[0]

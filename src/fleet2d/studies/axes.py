@@ -268,7 +268,8 @@ class FloorplansAxis(Axis):
         for pattern in self.floorplans:
             path = folder_of(pattern) / Path(pattern).expanduser()
             candidates = path.iterdir() if path.is_dir() else path.parent.glob(path.name)
-            plans = sorted(p for p in candidates if p.suffix.lower() in suffixes)
+            visible = (p for p in candidates if path.name[:1] == "." or p.name[0] != ".")
+            plans = sorted(p for p in visible if p.suffix.lower() in suffixes)
             if not plans:
                 raise ScenarioError(
                     f"no floor plan matches {pattern!r} in {folder_of(pattern)}: name a folder, a"
