@@ -183,7 +183,8 @@ def _chunk_of(array: pa.Array, column: Column, words: Words) -> ColumnChunk:
         text = np.empty(0, np.uint8) if data is None else np.frombuffer(data, np.uint8)
         return ColumnChunk(text[ends[0] : ends[-1]], valid, np.diff(ends))
     if column.kind == "time":
-        array = array.cast(pa.timestamp("us", array.type.tz)).cast(pa.int64())
+        in_us = array.cast(pa.timestamp("us", array.type.tz))
+        array = in_us.cast(pa.int64())
     if array.null_count:
         array = array.fill_null(False if column.kind == "bool" else 0)
     values = array.to_numpy(zero_copy_only=False)
@@ -230,12 +231,13 @@ def _values_of(array: pa.Array) -> NDArray[Any]:
         return cast(NDArray[Any], words[_values_of(array.indices)])
     if pa.types.is_string(array.type):
         return np.array(array.to_pylist(), object)
+    _, content = array.buffers()
     if pa.types.is_boolean(array.type):
-        flags = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
+        flags = np.unpackbits(np.frombuffer(content, np.uint8), bitorder="little")
         return flags[array.offset :][: len(array)].astype(bool)
     stored = pa.timestamp("us") if pa.types.is_timestamp(array.type) else array.type
     dtype = next(DTYPES[kind] for kind, each in _TYPES.items() if each == stored)
-    return np.frombuffer(array.buffers()[1], dtype, len(array), array.offset * dtype.itemsize)
+    return np.frombuffer(content, dtype, len(array), array.offset * dtype.itemsize)
 
 
 class ParquetTable:
@@ -382,7 +384,8 @@ def with_categories(table: pa.Table) -> pa.Table:
         # The dictionary of the first chunk comes first in the unified one.
         no_codes = number_array(np.empty(0, np.int32), pa.int32(), None)
         first = pa.DictionaryArray.from_arrays(no_codes, string_array(column.categories))
-        chunks = pa.chunked_array([first, *table.column(i).chunks]).unify_dictionaries().chunks
+        unified = pa.chunked_array([first, *table.column(i).chunks]).unify_dictionaries()
+        chunks = unified.chunks
         names = chunks[0].dictionary
         known = len(column.categories)
         if not column.is_growing and len(names) > known:

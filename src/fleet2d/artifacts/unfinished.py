@@ -497,8 +497,10 @@ def columns_of(entry: LoggedRows) -> dict[str, object]:
         values, valid, _ = entry.chunk[column.name]
         if column.takes_strings:
             columns[column.name] = table[column.name].to_pylist()
+        elif valid is None:
+            columns[column.name] = values
         else:
-            columns[column.name] = values if valid is None else np.ma.MaskedArray(values, ~valid)
+            columns[column.name] = np.ma.MaskedArray(values, ~valid)
     return columns
 
 

@@ -449,7 +449,8 @@ def lookup(kind: str, name: str) -> type[Component]:
 
 def components(kind: str) -> dict[str, type[Component]]:
     """Return every component of a kind, built in or from an entry point, by name, sorted."""
-    types = {cls.type_name: cls for cls in map(_built_in, COMPONENTS.get(kind, {}).values())}
+    classes = map(_built_in, COMPONENTS.get(kind, {}).values())
+    types = {cls.type_name: cls for cls in classes}
     entries = filter(_is_there, _plugins(kind))
     plugins = {entry.name: lookup(kind, entry.name) for entry in entries}
     return dict(sorted((plugins | types).items()))

@@ -101,7 +101,8 @@ def compose(text: str) -> yaml.Node | None:
     """
     longest = max(map(len, text.splitlines()), default=0)
     try:
-        if len(text) > _SHORT or text.count("[") + text.count("{") + 2 * longest > _SHALLOW:
+        depth = text.count("[") + text.count("{") + 2 * longest  # at most
+        if len(text) > _SHORT or depth > _SHALLOW:
             _check_events(text, _FastLoader)
         return _composed(_FastLoader(text))
     except yaml.YAMLError as error:

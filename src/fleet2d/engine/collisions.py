@@ -129,10 +129,12 @@ class BlockedWays(Watcher):
             plan: Plan | None = plan_after(now, actor.plan, step + 1, notes)
             self._waits[row] = Wait(since, step + 1, other)
         else:
-            others = [a for a in self._actors if a.row != row and not a.state.away]
-            reach = self._reach(row, np.array([a.row for a in others], np.int64))
+            present = [other for other in self._actors if not other.state.away]
+            others = [other for other in present if other.row != row]
+            reach = self._reach(row, np.array([other.row for other in others], np.int64))
             cell = int(lattice.cell * lattice.units_per_m)
-            positions = np.array([a.state.position for a in others], np.int64).reshape(-1, 2)
+            points = [other.state.position for other in others]
+            positions = np.array(points, np.int64).reshape(-1, 2)
             clear = np.column_stack([positions, reach + cell])
             plan = plan_around(now, actor.plan, bodies.timelines, clear)
             until = step + micros(PASSING_TIME) // step_us + 1

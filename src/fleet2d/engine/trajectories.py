@@ -289,6 +289,6 @@ class KeyFrames:
 
 def _key(row: int, kind: int, time_us: int, pose: Pose) -> KeySegment:
     """Return the key frame of a random walk at a pose."""
-    moment, x, y, heading = (np.array([number], np.int64) for number in (time_us, *pose[:3]))
+    moment, x, y, heading = np.array([time_us, *pose[:3]], np.int64)[:, None]
     away = np.array([pose.away], np.uint8)
     return KeySegment(Breakpoints(moment, x, y, heading, away), 0, 1, row, kind)

@@ -125,8 +125,8 @@ class Yielding(Watcher):
         self._beat_us = self._step_us if len(self.rows) > 1 else 1
         self._ahead = self._steps(AHEAD)
         self._free_for = self._steps(FREE_FOR)
-        self._tries = np.array([self._steps(wait) for wait in WAITS], np.int64)
-        self._tries_aside = np.array([self._steps(wait) for wait in WAITS_ASIDE], np.int64)
+        self._tries = np.array(list(map(self._steps, WAITS)), np.int64)
+        self._tries_aside = np.array(list(map(self._steps, WAITS_ASIDE)), np.int64)
         self._waits: dict[int, GivenWay] = {}
         # When, and where, there was no way round.
         self._looked_round: dict[int, tuple[int, object]] = {}
@@ -220,7 +220,8 @@ class Yielding(Watcher):
         plan.interrupts = actor.arbiter.own
         actor.follow_instead(plan, now)
         self._bodies.follow(row, actor.motion, plan.began[1], plan.posture_times())
-        if self._bodies.pose_at(row, now.step + 1)[:2] == actor.state.position:
+        after = self._bodies.pose_at(row, now.step + 1)
+        if after.position == actor.state.position:
             plan.notes[:0] = self._overlap_notes(now, self._hits(now))
 
     # Whom each robot minds
@@ -291,7 +292,8 @@ class Yielding(Watcher):
 
     def _present(self, step: int) -> Distances:
         """Return what the robots keep from all bodies at a step."""
-        if self._distances is not None and not (self._patience or self._pauses or self._swapped):
+        may_end = self._patience or self._pauses or self._swapped
+        if self._distances is not None and not may_end:
             return self._distances
         lasting: tuple[dict[Any, Patience], ...] = self._patience, self._pauses
         for patiences in lasting:
@@ -411,9 +413,10 @@ class Yielding(Watcher):
         """Return other plans for a robot, or for the one that it meets at a step; none to go on."""
         row = now.actor.row
         if self._goes_first(row, other, now.step):
-            round_it = self._by_waiting(now, at, other) if self._rests(other, now.step) else None
-            if round_it is not None:
-                return [(now, self._noted(now, other, round_it))]
+            if self._rests(other, now.step):
+                round_it = self._by_waiting(now, at, other)
+                if round_it is not None:
+                    return [(now, self._noted(now, other, round_it))]
             # For as long as the other one looks ahead: else it never has the time to get away.
             stop = self._stop(now, self._ahead)
             return [(now, self._blocked(now, at, other, stop))]
@@ -452,8 +455,9 @@ class Yielding(Watcher):
         planned_at = self._actors[other].planned_at
         self._pauses[actor.row] = Patience(now.step + pause, planned_at, other)
         plan = self._blocked(now, at, other, self._stop(now, pause))
-        if actor.row in self._waits:
-            self._waits[actor.row] = self._waits[actor.row]._replace(pause=pause)
+        wait = self._waits.get(actor.row)
+        if wait is not None:
+            self._waits[actor.row] = wait._replace(pause=pause)
         return plan
 
     def _by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
@@ -463,7 +467,8 @@ class Yielding(Watcher):
             return plan
         actor = self._actors[now.actor.row]
         standing = self._standing(now)
-        seen = actor.state, actor.arrangement, self._stop_of(actor, at), standing.tobytes()
+        stop = self._stop_of(actor, at)
+        seen = actor.state, actor.arrangement, stop, standing.tobytes()
         last, where = self._looked_round.get(actor.row, (None, None))
         if last is not None and (now.step - last < self._ahead or where == seen):
             return None
@@ -535,7 +540,7 @@ class Yielding(Watcher):
             row, now.step, wait, self._politely[row], now.step
         )
         assert continued is not None, "up to the present step, it meets nobody"
-        return plan_along(now, self._actors[row].plan, continued)
+        return plan_along(now, now.actor.plan, continued)
 
     def _pause(self, now: Situation) -> int:
         """Return for how many steps a robot stands before it looks again: longer and longer."""
@@ -552,7 +557,7 @@ class Yielding(Watcher):
         notes = self._overlap_notes(now, hits)
         if not notes:
             return None
-        plan = plan_after(now, self._actors[now.actor.row].plan, now.step)
+        plan = plan_after(now, now.actor.plan, now.step)
         plan.notes[:0] = notes
         return plan
 
@@ -602,7 +607,8 @@ class Yielding(Watcher):
     def _goes_on(self, wait: GivenWay, now: Situation) -> bool:
         """Return whether a robot that has to wait now does so still."""
         is_soon = now.step - wait.last <= self._steps(SAME_WAIT) + wait.pause
-        return is_soon and math.dist(wait.place, now.actor.state.position) <= self._same_place
+        moved = math.dist(wait.place, now.actor.state.position)
+        return is_soon and moved <= self._same_place
 
     def _blocked(self, now: Situation, at: int, other: int, plan: Plan) -> Plan:
         """Return what a robot does for which nothing is free: it waits, or skips its stop."""
@@ -625,7 +631,8 @@ class Yielding(Watcher):
         if waited >= self._steps(patience) and _goes_somewhere(actor):
             self._waits[row] = wait._replace(since=now.step, swaps=0)
             return self._without_stop(now, name)
-        if other in self._number and waited >= (wait.swaps + 1) * self._steps(DEADLOCK):
+        longest = (wait.swaps + 1) * self._steps(DEADLOCK)
+        if other in self._number and waited >= longest:
             self._waits[row] = wait._replace(swaps=wait.swaps + 1)
             self._swap(row, other, now.step)
             plan.notes.insert(0, Note(now.step * self._step_us, EventKind.DEADLOCK, name))
@@ -722,10 +729,11 @@ class Yielding(Watcher):
         start = actor.entity.start
         if actor.state.away or (start is not None and is_point(start)):
             return
-        others = [a for a in self._actors[: actor.row] if not a.state.away]
         here = actor.state.position
-        positions = np.array([a.state.position for a in others], np.int64).reshape(-1, 2)
-        reach = self._near[self._number[actor.row]][[a.row for a in others]]
+        others = [each for each in self._actors[: actor.row] if not each.state.away]
+        points = [each.state.position for each in others]
+        positions = np.array(points, np.int64).reshape(-1, 2)
+        reach = self._near[self._number[actor.row], [each.row for each in others]]
         squared = ((positions - here) ** 2).sum(axis=1)
         if (squared >= reach * reach).all():
             return

@@ -97,12 +97,13 @@ def parse_span(value: object) -> HoursSpan:
             f"expected hours, got {shown(value)}: write them like '08:00-22:00',"
             " 'weekdays 9:00-17:00' or 'monday,friday 22:00-06:00'"
         )
-    begin, end = (parse_time_of_day(text) for text in words[-1].split("-"))
+    *named, hours = words
+    begin, end = (parse_time_of_day(text) for text in hours.split("-"))
     if begin == end:
         raise problem(f"hours must begin and end at different times, got {shown(value)}")
-    days = sorted(weekdays_of((words[0] if words[1:] else "daily").split(",")))
-    names = "" if len(words) == 1 else f"{words[0]} "
-    text = f"{names}{format_time_of_day(begin)}-{format_time_of_day(end)}"
+    (names,) = named or ("daily",)
+    days = sorted(weekdays_of(names.split(",")))
+    text = " ".join([*named, f"{format_time_of_day(begin)}-{format_time_of_day(end)}"])
     return HoursSpan(tuple(days), begin, end if end > begin else end + DAY, text)
 
 

@@ -257,7 +257,7 @@ class Bodies:
     def hold(self, row: int, pose: Pose) -> None:
         """Let a body rest at a pose from the present step on."""
         moment = np.array([self.step * self._step_us], np.int64)
-        x, y, heading = (np.array([value], np.int64) for value in pose[:3])
+        x, y, heading = np.array(pose[:3], np.int64)[:, None]
         track = Breakpoints(moment, x, y, heading, np.array([pose.away], np.uint8))
         self.timelines.follow(row, self.step, track, *STANDING)
         self._window = self._block = None

@@ -260,7 +260,7 @@ class RequestQueue:
         ready = [request for request in self.open if request.not_before <= time]
         if people is not None:
             ready = [request for request in ready if request.to in people]
-        return sorted(ready, key=lambda r: (-r.interaction.worth, r.until, r.name))
+        return sorted(ready, key=lambda each: (-each.interaction.worth, each.until, each.name))
 
     def next_ready(self, time: datetime) -> datetime | None:
         """Return when a request that has to wait may be tried again; None: none has to."""

@@ -384,10 +384,12 @@ def parse_when(value: object) -> datetime | timedelta | ClockTime:
         return parse_moment(value)
     if words[1:] and words[0][0].isdigit():  # 2026-01-07 14:00
         return parse_moment(value)
-    time = parse_time_of_day(words[-1])
-    days = weekdays_of((words[0] if words[1:] else "daily").split(","))
-    name = f"{words[0]} " if words[1:] else ""
-    return ClockTime(tuple(sorted(days)), time, f"{name}{format_time_of_day(time)}")
+    *named, time_of_day = words
+    time = parse_time_of_day(time_of_day)
+    (names,) = named or ("daily",)
+    days = sorted(weekdays_of(names.split(",")))
+    text = " ".join([*named, format_time_of_day(time)])
+    return ClockTime(tuple(days), time, text)
 
 
 When = Annotated[

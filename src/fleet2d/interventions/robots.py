@@ -319,7 +319,8 @@ class Trouble(RobotIntervention, Lasting):
     def end(self, world: World) -> None:
         """Undo it; the robot knows its place again, unless it is lost for another reason."""
         self._apply(world)  # all that are still active
-        if not self.loses_place or any(is_lost(act, self.entity) for act in world.lasting):
+        is_lost_still = any(is_lost(act, self.entity) for act in world.lasting)
+        if is_lost_still or not self.loses_place:
             return
         displacements = self.actor(world).displacements
         if displacements and displacements[-1].end > world.step:

@@ -156,7 +156,8 @@ def _cut(run: Run, name: str, first: int, end: int) -> Any:
         table = table.take(key_frame_rows(table, first, end))
     else:
         step = table["step"].to_numpy()
-        table = table.take(np.flatnonzero((step >= first) & (step < end)))
+        is_within = (step >= first) & (step < end)
+        table = table.take(np.flatnonzero(is_within))
     import pyarrow as pa
 
     step = np.maximum(table["step"].to_numpy() - first, 0)

@@ -168,7 +168,8 @@ def day_of(run: Run, number: int) -> tuple[int, int]:
     first = max(clock.step_at_or_after(begins_us), 0)
     end = min(clock.step_at_or_after(begins_us + DAY_US), clock.steps)
     if first >= end:
-        last = (clock.time(clock.steps - 1).date() - clock.start.date()).days + 1
+        last_date = clock.time(clock.steps - 1).date()
+        last = (last_date - clock.start.date()).days + 1
         raise InputError(f"the run has no day {number}: its days are 1 to {last}")
     return first, end
 
@@ -223,7 +224,8 @@ def rows_of(table: "pa.Table", name: str, first: int, end: int) -> list[dict[str
     step = table["step"]
     is_in = compute.and_(compute.greater_equal(step, first), compute.less(step, end))
     is_own = compute.equal(compute.cast(table["entity"], pa.string()), name)
-    rows: list[dict[str, Any]] = table.filter(compute.and_(is_in, is_own)).to_pylist()
+    own = table.filter(compute.and_(is_in, is_own))
+    rows: list[dict[str, Any]] = own.to_pylist()
     return rows
 
 

@@ -153,7 +153,8 @@ class PathReader:
                 f"key_frames.parquet has poses of {self._entity} outside of the floor plan: it is"
                 " damaged; `fleet2d verify` says which files have changed"
             )
-        xs, ys = plan.lattice.to_metres(np.stack([out.x, out.y], axis=-1)).T
+        points = np.stack([out.x, out.y], axis=-1)
+        xs, ys = plan.lattice.to_metres(points).T
         is_away = out.away.astype(bool)
         room = np.where(out.away, -1, plan.room_of_place[row, column])
         return Trajectory(steps, clock.times(steps), xs, ys, in_radians(out.heading), is_away, room)
@@ -177,7 +178,8 @@ class PathReader:
         # The stored end of the walk; a walk without a step ended as the body was put elsewhere.
         if begin + 1 < len(keys["x"]) and stop > step:
             last = (poses.x[-1], poses.y[-1], poses.heading[-1])
-            if last != tuple(keys[name][begin + 1] for name in ("x", "y", "heading")):
+            stored = tuple(keys[name][begin + 1] for name in ("x", "y", "heading"))
+            if last != stored:
                 raise ArtifactError(
                     f"the random walk of {self._entity} from step {step} on can't be rebuilt: it"
                     " was walked by other rules than those of its behavior 'meander', or by"
@@ -231,7 +233,8 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
     column = {name: values_of(table[name])[own] for name in names}
     numbers = {name: number for number, name in enumerate(KEY_KINDS)}
     kind = np.array([numbers[name] for name in column["kind"].tolist()], np.int64)
-    xy = plan.lattice.to_lattice(np.stack([column["x"], column["y"]], axis=-1))
+    places = np.stack([column["x"], column["y"]], axis=-1)
+    xy = plan.lattice.to_lattice(places)
     headings = np.rint(column["heading"] * (TURN / (2 * np.pi)))
     start_us = int(run.clock.stamp(0).astype(np.int64))
     return {

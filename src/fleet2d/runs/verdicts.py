@@ -62,7 +62,8 @@ def verdicts_of(run: "Run") -> list[ExpectationVerdict]:
         if outcome == "violated":
             first_steps = [begin for begin, _ in violations.get(name, ())]
             step = first_steps[0] if first_steps else int(record.get("first", 0))
-        verdicts.append(ExpectationVerdict(name, outcome, str(record.get("says") or name), step))
+        says = str(record.get("says") or name)
+        verdicts.append(ExpectationVerdict(name, outcome, says, step))
     return sorted(verdicts, key=lambda v: (v.step is None, v.step or 0))
 
 

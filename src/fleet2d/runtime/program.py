@@ -157,7 +157,8 @@ class ExternalProgram:
         self, content: Mapping[str, Any], blocks: Mapping[str, bytes], expected: str
     ) -> Answer:
         if blocks:
-            content = {**content, "blocks": [[name, len(data)] for name, data in blocks.items()]}
+            sizes = [[name, len(data)] for name, data in blocks.items()]
+            content = {**content, "blocks": sizes}
         self._take_arrived()
         if self._unread:
             raise self._failure(f"wrote {bytes(self._unread[:80])!r} without being asked")

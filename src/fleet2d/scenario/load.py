@@ -54,7 +54,8 @@ def load_scenario(
         source = source.resolved()
     elif isinstance(source, str | Path) and not str(source).startswith("bundled:"):
         folder = Path(source).absolute().parent
-    document = compose(source, overrides, {_key(name): v for name, v in settings.items()})
+    changes = {_key(name): value for name, value in settings.items()}
+    document = compose(source, overrides, changes)
     return scenario_of(document, folder)
 
 
@@ -148,7 +149,8 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
             continue
         groups.add(group or "")
         line["msg"] += _type_with_key(line, location, document.data)
-        key = (document.place(location), one_line(".".join(map(str, location)), 200))
+        path = ".".join(map(str, location))
+        key = (document.place(location), one_line(path, 200))
         problems.setdefault(key, []).append(line)
     texts = []
     for written_at, details in problems.items():

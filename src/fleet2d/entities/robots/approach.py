@@ -60,7 +60,8 @@ class BeliefBehavior(Behavior):
     def output(self, now: Situation) -> Any:
         """Return the output that it reads, evaluated at the present time; None before the first."""
         output: Any = now.outputs.get(self.source) if self.source else None
-        return output.at(now.time) if callable(getattr(output, "at", None)) else output
+        varies = callable(getattr(output, "at", None))
+        return output.at(now.time) if varies else output
 
     def belief(self, now: Situation, user: str) -> RoomBelief:
         """Return the probabilities of where a user, or ANYONE, is now.
@@ -125,8 +126,8 @@ def viewpoints_of(actor: Actor, room: Room, enough: float, most: int) -> Viewpoi
         most: The maximum number of points.
     """
     home = actor.home
-    space = actor.space
-    key = "views", home.walls, space, actor.part, sight_range(actor), room.index, enough, most
+    body = actor.space, actor.part, sight_range(actor)
+    key = "views", home.walls, *body, room.index, enough, most
     return home.cached(key, lambda: _choose_viewpoints(actor, room, enough, most))
 
 

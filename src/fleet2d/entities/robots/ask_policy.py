@@ -130,7 +130,8 @@ class AskPolicy(LearnedBehavior, Interact):
     def _may_serve(self, now: Situation, request: Request) -> bool:
         """Return whether the person of a request may be addressed, or looked for."""
         to = request.to
-        if self._is_broken_off(now) and self.served is not None and self.served.request.to == to:
+        is_asked = self.served is not None and self.served.request.to == to
+        if is_asked and self._is_broken_off(now):
             return False  # it was sent away while it asked
         place = now.in_view.get(to)
         if place is not None:

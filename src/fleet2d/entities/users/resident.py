@@ -147,7 +147,8 @@ class Spots:
 
     def can_reach(self, seat: Seat) -> bool:
         """Return whether the body can get to a place at furniture at present."""
-        return self._can_reach(self._actor.home.object(seat.thing).uses[seat.place])
+        thing = self._actor.home.object(seat.thing)
+        return self._can_reach(thing.uses[seat.place])
 
     def _can_reach(self, use: UsePlace) -> bool:
         """Return whether the body can get to a place at furniture, or close enough to use it."""
@@ -468,7 +469,8 @@ class ResidentBehavior(Behavior):
         self.planned_until = -1  # the step up to which the last plan goes
         self.given_up: tuple[int, int] | None = None  # the episode that is not to be continued
         self.reachable_rooms = actor.reachable_rooms()
-        self.venues = {name: self._venue(actor, a) for name, a in activities.items()}
+        venues = activities.items()
+        self.venues = {name: self._venue(actor, activity) for name, activity in venues}
         for name, venue in self.venues.items():
             if not (venue.rooms or venue.activity.away):  # rest replaces it
                 rooms = " or ".join(venue.activity.rooms)
@@ -541,12 +543,13 @@ class ResidentBehavior(Behavior):
         """
         ordinal = time.toordinal()
         now_us = self.clock.elapsed(time)
-        if now_us < self.clock.reading(ordinal, self.day(ordinal)[0].begin):
+        first = self.day(ordinal)[0]
+        if now_us < self.clock.reading(ordinal, first.begin):
             ordinal -= 1
         while True:
             day = self.day(ordinal)
-            first = bisect_right(day, now_us, key=partial(self._end_us, ordinal))
-            for number in range(first, len(day)):
+            begin = bisect_right(day, now_us, key=partial(self._end_us, ordinal))
+            for number in range(begin, len(day)):
                 yield (ordinal, number), day[number]
             ordinal += 1
 
@@ -594,7 +597,8 @@ class ResidentBehavior(Behavior):
 
     def _within(self, venue: Venue, rooms: list[Room]) -> Venue:
         """Return the venue of an activity, in some of its rooms only."""
-        return venue._replace(rooms=rooms, seats=self.spots.at_furniture(venue.activity, rooms))
+        seats = self.spots.at_furniture(venue.activity, rooms)
+        return venue._replace(rooms=rooms, seats=seats)
 
     def _venue(self, actor: Actor, activity: Activity) -> Venue:
         if activity.away:
