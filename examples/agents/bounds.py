@@ -2,7 +2,8 @@
 
 People don't react to a robot, so where they are and what they do follows from a life in which the
 robot only rests. Each bound leaves out something that costs, so no policy's expected reward exceeds
-it; `docs/how-to/gym.md` says what. For the task hangout there is also a plan that keeps to the rules.
+it; `docs/how-to/gym.md` says what. For the task hangout there is also a plan that keeps to the
+rules.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """What a household makes of its robots: company, disturbance, drives, searches, answers.
 
-Its numbers are what learning agents are rewarded by (docs/how-to/gym.md), so bundled behaviors and learned
-policies are measured alike. They are truth, which robots never read.
+Its numbers are what learning agents are rewarded by (docs/how-to/gym.md), so bundled behaviors and
+learned policies are measured alike. They are truth, which robots never read.
 """
 
 from collections.abc import Sequence
