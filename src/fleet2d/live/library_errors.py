@@ -56,4 +56,5 @@ def libraries_told(tell: Callable[[str], object]) -> Iterator[None]:
     finally:
         threading.excepthook = hook
         for logger, (handlers, propagates) in zip(loggers, before, strict=True):
-            logger.handlers, logger.propagate = handlers, propagates
+            logger.handlers = handlers
+            logger.propagate = propagates

@@ -65,7 +65,8 @@ class FunctionPeer(Peer):
         messages: Iterable[Mapping[str, Any]] = (),
     ) -> None:
         """Take a function, and messages that are read in a thread of their own."""
-        self._function, self._messages = function, messages
+        self._function = function
+        self._messages = messages
 
     def open(self, simulation: Simulation, post: Post) -> None:
         """Begin to read the messages."""
@@ -181,7 +182,8 @@ class WebSocketPeer(Peer):
         self._address = f"ws://{host}:{self.port}"
         self._clients: dict[Any, queue.Queue[str | None]] = {}
         self._lock = threading.Lock()
-        self._hello, self._numbers = "", itertools.count()
+        self._hello = ""
+        self._numbers = itertools.count()
         self._end: tuple[str | None, ...] = ()
         self._post: Post
 

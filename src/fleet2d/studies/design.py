@@ -125,7 +125,8 @@ def home_key(content: Mapping[str, Any]) -> str:
 
 NOT_APPLICABLE = -1
 MAX_VARIANTS = 1_000_000
-WITH, WITHOUT = "with", "without"
+WITH = "with"
+WITHOUT = "without"
 """Labels of runs of a rollout: with the change from its stage on, and without it."""
 # The number of combinations of the first life that are checked before any home is built.
 TRIED_FIRST = 100

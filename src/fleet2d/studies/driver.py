@@ -190,7 +190,8 @@ def check_study(
     with extra("study", "studies need polars"):
         import polars as pl  # noqa: F401 - whether it is there
     specification = read_specification(source)
-    scenarios, names = ScenarioFile(), KnownNames()
+    scenarios = ScenarioFile()
+    names = KnownNames()
 
     def on_scenario(template: str, scenario: Scenario) -> None:
         scenarios.add(template, scenario)

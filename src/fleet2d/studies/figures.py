@@ -42,7 +42,8 @@ def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
     numbers = [c for c in columns if schema[c].is_float()]
     texts = [c for c in columns if schema[c] == pl.String]
     if end in numbers:
-        column, selectors = end, middle
+        column = end
+        selectors = middle
     elif numbers:
         column = numbers[0]
         selectors = [*middle, end]

@@ -8,6 +8,7 @@ import math
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,12 +84,12 @@ def percentiles(study: StudyAnswers, metric: str) -> "pl.DataFrame":
     values = np.sort(by_robot(study, metric)["value"].to_numpy())
     rows = []
     for percent in PERCENTS:
-        low, high = quantile_ranks(len(values), percent / 100)
+        ranks = quantile_ranks(len(values), percent / 100)
         value = float(np.quantile(values, percent / 100, method="inverted_cdf"))
-        ends = [float(values[i]) if i is not None else None for i in (low, high)]
-        doubt = f"{len(values)} robots are too few" if None in ends else ""
-        row = {"percent": percent, "value": value, "low": ends[0], "high": ends[1]}
-        rows.append({**row, "doubt": doubt})
+        low, high = [None if rank is None else float(values[rank]) for rank in ranks]
+        doubt = f"{len(values)} robots are too few" if None in ranks else ""
+        row = {"percent": percent, "value": value, "low": low, "high": high, "doubt": doubt}
+        rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
@@ -101,9 +102,10 @@ def quantile_ranks(count: int, share: float) -> tuple[int | None, int | None]:
     with extra("study", "intervals need scipy"):
         from scipy.special import bdtr
     tail = (1 - LEVEL) / 2
-    below = [i for i in range(count + 1) if bdtr(i, count, share) > tail]
-    low = below[0] - 1  # as many values or fewer are below the quantile with a tail's probability
-    high = next((i for i in range(count + 1) if bdtr(i, count, share) >= 1 - tail), count)
+    # The probability that so many values or fewer are below the quantile.
+    chances = bdtr(np.arange(count + 1), count, share)
+    low = int(np.argmax(chances > tail)) - 1
+    high = int(np.argmax(chances >= 1 - tail))
     return (low if low >= 0 else None), (high if high < count else None)
 
 
@@ -126,11 +128,10 @@ def worst(study: StudyAnswers, metric: str, share: float = WORST_SHARE) -> "pl.D
     better = study.better(metric)
     if not better:
         raise InputError(f"no value of {metric} is better than another: its metric doesn't say so")
-    robots = by_robot(study, metric).sort(
-        "value", descending=better == "lower", maintain_order=True
-    )
+    robots = by_robot(study, metric)
     count = max(1, math.ceil(share * len(robots)))
-    found = robots.head(count)
+    order = robots.sort("value", descending=better == "lower", maintain_order=True)
+    found = order.head(count)
     rerun = f"fleet2d study rerun {shlex.quote(study.location)}"
     commands = [f"{rerun} {variant} --out worst{variant}" for variant in found[VARIANT]]
     return found.with_columns(pl.Series("command", commands))
@@ -169,6 +170,9 @@ class GroupCondition:
         return met if self.is_met else ~met
 
 
+GroupPath = tuple[GroupCondition, ...]
+
+
 @dataclass(frozen=True)
 class Group:
     """Robots that differ from others, found on half of the homes and tested on the others.
@@ -182,7 +186,7 @@ class Group:
         high: Its upper end.
     """
 
-    conditions: tuple[GroupCondition, ...]
+    conditions: GroupPath
     robots: int
     estimate: MeanEstimate
     p: float
@@ -211,39 +215,38 @@ def find_groups(
     numbers = np.array([places[home] for home in homes], np.int64)
     finds = numbers % 2 == 0
     smallest = max(ENOUGH_UNITS, math.ceil(SMALLEST_SHARE * finds.sum()))
-    splits: list[tuple[tuple[GroupCondition, ...], GroupCondition, float]] = []
-    leaves: list[tuple[GroupCondition, ...]] = []
+    p_values: dict[GroupPath, float] = {}
+    leaves: list[GroupPath] = []
 
-    def grow(path: tuple[GroupCondition, ...], inside: Bool) -> None:
+    def grow(path: GroupPath, inside: Bool) -> None:
         split = None if len(path) == DEPTH else _best(values, columns, inside & finds, smallest)
         if split is None:
             leaves.append(path)
             return
         met = split.holds(columns)
         tests = inside & ~finds
-        splits.append((path, split, _p_of_split(values[tests], met[tests], numbers[tests])))
+        p_values[path] = _p_of_split(values[tests], met[tests], numbers[tests])
         for is_met, side in ((True, met), (False, ~met)):
             grow((*path, replace(split, is_met=is_met)), inside & side)
 
     grow((), np.ones(len(values), np.bool_))
-    corrected = holm([p for *_, p in splits])
-    clear = {path: p for (path, _, _), p in zip(splits, corrected, strict=True) if p < 1 - LEVEL}
+    corrected = dict(zip(p_values, holm(list(p_values.values())), strict=True))
+    clear = {path: p for path, p in corrected.items() if p < 1 - LEVEL}
     kept = list(dict.fromkeys(_pruned(path, clear) for path in leaves))
     if kept == [()]:
         return []
     groups = []
     for path in kept:
-        inside = np.logical_and.reduce([~finds, *(c.holds(columns) for c in path)])
-        labels = [home for home, is_in in zip(homes, inside, strict=True) if is_in]
-        found = estimate(values[inside], {"home": labels})
+        inside = ~finds
+        for condition in path:
+            inside &= condition.holds(columns)
+        found = estimate(values[inside], {"home": list(compress(homes, inside))})
         low, high = found.interval(1 - (1 - LEVEL) / len(kept))
         groups.append(Group(path, int(inside.sum()), found, clear[path[:-1]], low, high))
     return groups
 
 
-def _pruned(
-    path: tuple[GroupCondition, ...], clear: Mapping[Any, float]
-) -> tuple[GroupCondition, ...]:
+def _pruned(path: GroupPath, clear: Mapping[GroupPath, float]) -> GroupPath:
     """Return the start of a path up to the first split that isn't clear."""
     for depth in range(len(path)):
         if path[:depth] not in clear:
@@ -274,12 +277,13 @@ def _candidates(columns: Mapping[str, Sequence[Any]], inside: Bool) -> list[Grou
     """Return all conditions that may divide robots, at most so many of each feature."""
     found = []
     for feature, values in columns.items():
-        known = [v for v, is_in in zip(values, inside, strict=True) if is_in and v is not None]
+        known = [value for value in compress(values, inside) if value is not None]
         kinds = {type(value) for value in known}
         if known and kinds <= {int, float}:
             shares = np.linspace(0, 1, CUTS + 2)[1:-1]
             cuts = np.unique(np.quantile(known, shares, method="inverted_cdf"))
-            found += [GroupCondition(feature, cut.item(), True) for cut in cuts if cut < max(known)]
+            cuts = cuts[cuts < max(known)]
+            found += [GroupCondition(feature, cut, True) for cut in cuts.tolist()]
         else:
             found += [GroupCondition(feature, value, False) for value in dict.fromkeys(known)]
     return found
@@ -295,20 +299,22 @@ def _p_of_split(values: F64, met: Bool, homes: I64) -> float:
         met: Whether each is on the first side: bool (robots,).
         homes: The number of the home of each: int64 (robots,).
     """
-    sides = [len(np.unique(homes[side])) for side in (met, ~met)]
-    if min(sides) < 2:
+    other = ~met
+    fewest = min(len(np.unique(homes[met])), len(np.unique(homes[other])))
+    if fewest < 2:
         return math.nan
     with extra("study", "intervals need scipy"):
         from scipy.special import stdtr
-    means = [values[side].mean() for side in (met, ~met)]
-    shares = np.where(met, (values - means[0]) / met.sum(), -(values - means[1]) / (~met).sum())
+    mean = values[met].mean()
+    other_mean = values[other].mean()
+    shares = np.where(met, (values - mean) / met.sum(), (other_mean - values) / other.sum())
     of_homes = np.bincount(homes, shares)
     count = len(np.unique(homes))
     variance = float((of_homes**2).sum()) * count / (count - 1)
     if not variance > 0:
         return math.nan
-    ratio = abs(float(means[0] - means[1])) / math.sqrt(variance)
-    return float(2 * stdtr(min(sides) - 1, -ratio))
+    ratio = abs(float(mean - other_mean)) / math.sqrt(variance)
+    return float(2 * stdtr(fewest - 1, -ratio))
 
 
 def groups(
@@ -370,27 +376,25 @@ def with_fleet(study: StudyAnswers, answer: Conclusion) -> Conclusion:
 
 
 def _percentile_row(study: StudyAnswers, metric: str) -> dict[str, Any]:
-    unit = study.meta.unit(metric)
-    mean = study.summary(metric, []).select("mean", "low", "high", "doubt").to_dicts()[0]
+    (mean,) = study.summary(metric, []).select("mean", "low", "high", "doubt").to_dicts()
     rows = percentiles(study, metric).to_dicts()
     shares = {f"p{row['percent']}": row["value"] for row in rows}
-    return {"number": f"{metric} [{unit}]" if unit else metric, **mean, **shares}
+    return {"number": study.meta.with_unit(metric), **mean, **shares}
 
 
 def _spread(study: StudyAnswers, metric: str) -> str:
     rows = {row["percent"]: row for row in percentiles(study, metric).to_dicts()}
     robots = len(by_robot(study, metric))
-    unit = f" [{study.meta.unit(metric)}]" if study.meta.unit(metric) else ""
-    ends = rows[1], rows[99]
-    bounds = [f"{number(row['value'])} ({_end(row['low'])} to {_end(row['high'])})" for row in ends]
+    unit = study.meta.with_unit(metric).removeprefix(metric)
     return (
         f"Of {robots:,} robots half have a {metric} up to {number(rows[50]['value'])}{unit}; one in"
-        f" a hundred has up to {bounds[0]}, and one in a hundred from {bounds[1]} on."
+        f" a hundred has up to {_bound(rows[1])}, and one in a hundred from {_bound(rows[99])} on."
     )
 
 
-def _end(value: float | None) -> str:
-    return "?" if value is None else number(value)
+def _bound(row: Mapping[str, Any]) -> str:
+    low, high = ["?" if row[end] is None else number(row[end]) for end in ("low", "high")]
+    return f"{number(row['value'])} ({low} to {high})"
 
 
 def _worst(study: StudyAnswers, metric: str) -> str:
@@ -413,8 +417,10 @@ def _groups(study: StudyAnswers, metric: str, against: Mapping[str, Any] | None)
         return f"No group of homes or people was found in which {of} differs."
     parts = []
     for row in (found[0], found[-1]):
-        interval = "" if row["doubt"] else f" ({number(row['low'])} to {number(row['high'])})"
-        parts.append(f"{number(row['mean'])}{interval} where {row['group']}")
+        mean = number(row["mean"])
+        if not row["doubt"]:
+            mean += f" ({number(row['low'])} to {number(row['high'])})"
+        parts.append(f"{mean} where {row['group']}")
     return (
         f"Groups found on half of the homes, and tested on the others: {of} is least, {parts[0]},"
         f" and most, {parts[1]}."

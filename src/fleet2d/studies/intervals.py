@@ -76,12 +76,13 @@ class Spread:
         """
         from statistics import NormalDist
 
-        parts = [(self.components[level] / n, n - 1) for level, n in units.items()]
-        parts.append((self.residual / math.prod(units.values()), max(units.values()) - 1))
-        variance = sum_in_order(part for part, _ in parts)
+        counts = units.values()
+        variances = [self.components[kind] / count for kind, count in units.items()]
+        variances.append(self.residual / math.prod(counts))
+        variance = sum_in_order(variances)
         if not variance:
             return 0.0
-        freedom = variance**2 / sum_in_order(part**2 / df for part, df in parts)
+        freedom = satterthwaite(variances, [*(count - 1 for count in counts), max(counts) - 1])
         quantiles = student_quantile(freedom, level) + NormalDist().inv_cdf(power)
         return math.sqrt(variance) * quantiles
 
@@ -184,8 +185,8 @@ class MeanEstimate:
         """
         with extra("study", "intervals need scipy"):
             from scipy.special import bdtr
-        both = (2 * float(bdtr(min(signs), sum(signs), 0.5)) for signs in self.signs.values())
-        return max((min(1.0, p) for p in both), default=math.nan)
+        tails = [float(bdtr(min(signs), sum(signs), 0.5)) for signs in self.signs.values()]
+        return max((min(1.0, 2 * tail) for tail in tails), default=math.nan)
 
     def needed(self, level: float = LEVEL) -> dict[str, int]:
         """Return for each kind of units how many are needed to show that the mean isn't zero.
@@ -200,12 +201,13 @@ class MeanEstimate:
             # Of the sign test: so many units of the same sign are rarer by chance.
             fewest = math.floor(2 - math.log2(1 - level))
             return dict.fromkeys(self.spread.units, fewest) if self.mean else {}
-        return {
-            kind: max(count, current + 1, ENOUGH_UNITS if kind in self.signs else 0)
-            for kind, current in self.spread.units.items()
-            if current >= 2
-            and (count := self.spread.needed(self.mean, kind, level=level)) is not None
-        }
+        found = {}
+        for kind, current in self.spread.units.items():
+            count = self.spread.needed(self.mean, kind, level=level) if current >= 2 else None
+            if count is not None:
+                fewest = ENOUGH_UNITS if kind in self.signs else 0
+                found[kind] = max(count, current + 1, fewest)
+        return found
 
 
 def estimate(
@@ -268,18 +270,25 @@ def two_sample_interval(first: F64, second: F64, level: float = LEVEL) -> Limits
         level: The share of such intervals that contain the true difference.
     """
     sides = (first, second)
-    parts = [float(side.var(ddof=1)) / len(side) for side in sides]
-    variance = parts[0] + parts[1]
+    variances = [float(side.var(ddof=1)) / len(side) for side in sides]
+    variance = sum_in_order(variances)
     mean = float(first.mean() - second.mean())
     if not variance > 0:
         return math.nan, math.nan
-    squares = [part**2 / (len(side) - 1) for part, side in zip(parts, sides, strict=True)]
-    moments = [_third_moment(side) / len(side) ** 2 for side in sides]
+    moment, other_moment = [_third_moment(side) / len(side) ** 2 for side in sides]
     error = math.sqrt(variance)
-    skewness = (moments[0] - moments[1]) / (error * variance)
-    quantile = student_quantile(variance**2 / (squares[0] + squares[1]), level)
-    ends = [error * _inverse(sign * quantile, skewness) for sign in (1, -1)]
-    return mean - max(ends[0], error * quantile), mean - min(ends[1], -error * quantile)
+    skewness = (moment - other_moment) / (error * variance)
+    quantile = student_quantile(satterthwaite(variances, [len(s) - 1 for s in sides]), level)
+    below = max(_inverse(quantile, skewness), quantile)
+    above = min(_inverse(-quantile, skewness), -quantile)
+    return mean - error * below, mean - error * above
+
+
+def satterthwaite(variances: Sequence[float], freedoms: Sequence[float]) -> float:
+    """Return the degrees of freedom of the sum of variances that have these."""
+    parts = zip(variances, freedoms, strict=True)
+    squares = sum_in_order(variance**2 / freedom for variance, freedom in parts)
+    return sum_in_order(variances) ** 2 / squares
 
 
 def _signs(data: F64, numbers: I64) -> tuple[int, int]:

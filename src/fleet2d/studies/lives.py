@@ -42,7 +42,11 @@ MAX_SEED = 1 << 31
 SEED_STEP = 1_000_003
 FEATURES = ("people", "rooms", "bedrooms", "area_m2")
 """Columns of what a home and its household are."""
-HOME, HOUSEHOLD, HAS, BEDROOMS, AREA = "home", "household", "has", "bedrooms", "area_m2"
+HOME = "home"
+HOUSEHOLD = "household"
+HAS = "has"
+BEDROOMS = "bedrooms"
+AREA = "area_m2"
 FIT = "fit"
 SIZE_UNITS = ((BEDROOMS, "bedrooms"), (AREA, "m2"))
 # Bedrooms beyond those that a household needs, and of how many households in a hundred: in England
@@ -120,9 +124,13 @@ class FleetLife:
     @property
     def changes(self) -> tuple[tuple[tuple[str, ...], Any], ...]:
         """The (key path, value) pairs that it sets in the scenario."""
-        people = () if self.household is None else ((("users",), members_of(self.household)),)
-        own = tuple((key_path(key), value) for key, value in self.row.items() if "." in key)
-        return (*self.home.changes, *people, *(c for v in self.varied for c in v.changes), *own)
+        changes = list(self.home.changes)
+        if self.household is not None:
+            changes.append((("users",), members_of(self.household)))
+        for choice in self.varied:
+            changes += choice.changes
+        changes += [(key_path(key), value) for key, value in self.row.items() if "." in key]
+        return tuple(changes)
 
     @property
     def labels(self) -> dict[str, Label]:
@@ -266,10 +274,10 @@ class Draw:
     @property
     def asks_homes(self) -> bool:
         """Whether the facts of homes matter for what is drawn."""
-        return bool({*self._settings.where, *self.table_columns} & {*FEATURES, HAS}) or (
-            self._settings.fits
-            and (bool(self._settings.households) or HOUSEHOLD in self.table_columns)
-        )
+        settings = self._settings
+        asked = {*settings.where, *self.table_columns}
+        has_households = bool(settings.households) or HOUSEHOLD in self.table_columns
+        return not asked.isdisjoint((*FEATURES, HAS)) or (settings.fits and has_households)
 
     def seed_of(self, number: int) -> int:
         """Return the seed of a life."""
@@ -451,8 +459,8 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
         )
     for row in rows:
         for key, value in row.items():
-            if isinstance(value, str) and "." in key and _is_file(path.parent / value):
-                row[key] = str((path.parent / value).absolute())  # such as a log
+            if isinstance(value, str) and "." in key and _is_file(file := path.parent / value):
+                row[key] = str(file.absolute())  # such as a log
     return rows, ends, frame.columns
 
 

@@ -41,7 +41,8 @@ class Pilot(StudyAnswers):
 
         self.location = "the pilot"
         self.meta = describe(checked)
-        self.columns, self.populations = self.meta.columns, self.meta.populations
+        self.columns = self.meta.columns
+        self.populations = self.meta.populations
         self._checked = checked
         design = checked.plan.design
         of_variants = [design.parameters(index) for index in checked.plan.variants["index"]]

@@ -114,7 +114,8 @@ class KnownNames:
     def add(self, scenario: Scenario) -> None:
         """Add the names of a scenario."""
         self._tables |= {*scenario.algorithms, *scenario.metrics}
-        self._tables |= {"sensors"} if scenario.objects else set()
+        if scenario.objects:
+            self._tables.add("sensors")
         self._bodies |= {*scenario.users, *scenario.robots}
         for name, metric in scenario.metrics.items():
             kind = type(metric)

@@ -42,7 +42,8 @@ class Study(StudyAnswers):
         self._directory = directory
         self.location = directory.location
         self.meta = directory.read_meta()
-        self.columns, self.populations = self.meta.columns, self.meta.populations
+        self.columns = self.meta.columns
+        self.populations = self.meta.populations
 
     def __repr__(self) -> str:
         """Return its location and its progress."""

@@ -82,7 +82,8 @@ class Storage:
                 self.location = self.root
         else:
             self.folder = Path(source).absolute()
-            self.filesystem, self.root = pafs.LocalFileSystem(), str(self.folder)
+            self.filesystem = pafs.LocalFileSystem()
+            self.root = str(self.folder)
 
     def path(self, name: str) -> str:
         """Return the path of a file in the file system.

@@ -153,7 +153,8 @@ def suggested(trial: "optuna.Trial", name: str, parameter: Parameter) -> Any:
     assert parameter.low is not None
     assert parameter.high is not None
     if parameter.integer:
-        low, high = int(parameter.low), int(parameter.high)
+        low = int(parameter.low)
+        high = int(parameter.high)
         return trial.suggest_int(name, low, high, log=parameter.log)
     return rounded(trial.suggest_float(name, parameter.low, parameter.high, log=parameter.log))
 
@@ -383,8 +384,11 @@ class Search:
             settings: The `tune` section of the study file.
             crew: Where trials run.
         """
-        self._study, self._job, self._variants = study, job, variants
-        self._settings, self._crew = settings, crew
+        self._study = study
+        self._job = job
+        self._variants = variants
+        self._settings = settings
+        self._crew = crew
 
     def run(self, observer: TuneObserver | None) -> None:
         """Run trials up to the number of the settings; an interrupted batch is filled."""

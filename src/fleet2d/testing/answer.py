@@ -117,7 +117,8 @@ def _how_often(each: Tally) -> str:
         why = outcome.says.partition(": ")[2] or outcome.says
         return f"is untested in {len(each.failed)} of {number}: {why}"
     text = f"failed in {len(each.failed)} of {number}"
-    text += f", worst in {worst.label}" if len(each.failed) > 1 else f", in {worst.label}"
+    which = "worst in" if len(each.failed) > 1 else "in"
+    text += f", {which} {worst.label}"
     if outcome.margin is not None:
         text += f", by {margin_text(abs(outcome.margin), outcome.unit)}"
     if each.name == ASSERT:

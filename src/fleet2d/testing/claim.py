@@ -103,13 +103,15 @@ def rate_test(seeds: int, holds: float = 1.0, error: float = 0.05) -> RateTest:
         accept[seeds] = 0
         every = np.ones(seeds + 1, np.int64)
         return RateTest(seeds, holds, error, error ** (1 / seeds), accept, every)
-    low, high = 0.0, holds
+    low = 0.0
+    high = holds
     best = _bounded(seeds, holds, 0.0, error)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
         test = _bounded(seeds, holds, middle, error)
         if test.acceptance(middle) <= error:
-            low, best = middle, test
+            low = middle
+            best = test
         else:
             high = middle
     if best.alternative == 0:
@@ -172,7 +174,8 @@ def rate_interval(held: int, number: int, error: float = 0.05) -> tuple[float, f
         return math.fsum(map(math.exp, terms))
 
     def rate_of(count: int, probability: float) -> float:
-        low, high = 0.0, 1.0
+        low = 0.0
+        high = 1.0
         for _ in range(INTERVAL_BISECTIONS):
             middle = (low + high) / 2
             low, high = (middle, high) if at_least(count, middle) < probability else (low, middle)
@@ -243,7 +246,8 @@ def _bounded(seeds: int, holds: float, other: float, error: float) -> RateTest:
     # The fewest failures to refuse at the last seed so that refusals stay within the error.
     tail = refused + np.cumsum(last[::-1])[::-1]  # refusals if that many failures refuse
     most = int(np.argmax(np.append(tail, 0.0) <= error)) - 1
-    accept[seeds], refuse[seeds] = most, most + 1
+    accept[seeds] = most
+    refuse[seeds] = most + 1
     return RateTest(seeds, holds, error, other, accept, refuse)
 
 

@@ -80,7 +80,8 @@ class Shrinker:
             body: The test.
             tries: Largest number of runs.
         """
-        self._body, self.tries = body, tries
+        self._body = body
+        self.tries = tries
 
     def shrink(self, result: TrialResult) -> FailingCase | None:
         """Return the smallest version that it finds of a failing run; None if there is none."""

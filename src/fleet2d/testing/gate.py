@@ -19,7 +19,11 @@ from fleet2d.testing.suite import SuiteTest, TrialKey, TrialOutcome, TrialReport
 ERROR = 0.05
 """Largest probability that any expectation is called worse or better if none differs."""
 MAX_LISTED = 6
-HELD, FAILED, UNTESTED, UNDECIDED, BROKEN = "held", "failed", "untested", "undecided", "can't run"
+HELD = "held"
+FAILED = "failed"
+UNTESTED = "untested"
+UNDECIDED = "undecided"
+BROKEN = "can't run"
 NOT_COVERED = "not covered"
 NOT_RUN = "not run"
 RANKING = (BROKEN, FAILED, UNTESTED, UNDECIDED, NOT_RUN, HELD)

@@ -128,13 +128,11 @@ class VerdictHistory:
                     " VALUES (?, ?, ?, ?, ?, ?, ?)",
                     (*place, fingerprints[key.test], report.error, report.wall_s),
                 )
-                file.executemany(
-                    "INSERT INTO verdicts VALUES (?, ?, ?, ?, ?, ?, ?)",
-                    [
-                        (row.lastrowid, o.name, o.holds, o.fails, o.margin, o.unit, o.says)
-                        for o in report.outcomes
-                    ],
-                )
+                verdicts = [
+                    (row.lastrowid, o.name, o.holds, o.fails, o.margin, o.unit, o.says)
+                    for o in report.outcomes
+                ]
+                file.executemany("INSERT INTO verdicts VALUES (?, ?, ?, ?, ?, ?, ?)", verdicts)
 
     def reports(self, build: str, fingerprints: Mapping[str, str]) -> list[TrialReport]:
         """Return the trials of a build of tests that haven't changed since.
@@ -157,11 +155,12 @@ class VerdictHistory:
             held = None if holds is None else bool(holds)
             outcome = TrialOutcome(name, held, bool(fails), says, margin, unit)
             outcomes.setdefault(trial, []).append(outcome)
-        return [
-            TrialReport(TrialKey(test, home, seed), tuple(outcomes.get(number, ())), error, wall_s)
-            for number, test, home, seed, fingerprint, error, wall_s in self._rows(query, build)
-            if fingerprints.get(test) == fingerprint
-        ]
+        reports = []
+        for number, test, home, seed, fingerprint, error, wall_s in self._rows(query, build):
+            if fingerprints.get(test) == fingerprint:
+                key = TrialKey(test, home, seed)
+                reports.append(TrialReport(key, tuple(outcomes.get(number, ())), error, wall_s))
+        return reports
 
     def trend(self) -> dict[str, dict[Place, tuple[int, int]]]:
         """Return for each build how often each expectation held, and in how many trials."""

@@ -262,7 +262,10 @@ class FailureSearch(TaskQueue):
     ) -> None:
         """Prepare a search; with is_guided=False all points are random, for comparison."""
         super().__init__()
-        self._job, self._budget, self._seed, self._finds = job, budget, seed, finds
+        self._job = job
+        self._budget = budget
+        self._seed = seed
+        self._finds = finds
         self._started = 0
         self._deadline = math.inf
         self._generator = random.Random(seed)  # noqa: S311 - a search, not a secret
@@ -310,11 +313,13 @@ class FailureSearch(TaskQueue):
             good = sorted(point[name] for point in self.points)
             sides = [v for v in good if v < min(bad)], [v for v in good if v > max(bad)]
             parts = [_stretch(values) for values in sides if values]
-            lines += [f"{name}: {', '.join(parts)}"] if parts else []
+            if parts:
+                lines.append(f"{name}: {', '.join(parts)}")
         for name, choices in self._job.space.choices.items():
             tried = {point[name] for point in self.points} - {point[name] for point in failing}
             texts = [choices[number].words for number in sorted(tried)]
-            lines += [", ".join(texts)] if texts else []
+            if texts:
+                lines.append(", ".join(texts))
         return lines
 
     def answer(self, question: str, took: str) -> Conclusion:

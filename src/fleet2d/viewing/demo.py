@@ -16,7 +16,7 @@ from fleet2d.configuration.units import format_duration
 from fleet2d.errors import InputError
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.runtime.events import EventKind
-from fleet2d.viewing.story import ASLEEP, plain, titled
+from fleet2d.viewing.story import ASLEEP, plain, rows_of_metric, titled
 
 if TYPE_CHECKING:
     from fleet2d.runs.run import Run
@@ -116,7 +116,8 @@ def sentences(run: "Run") -> Iterator[str]:
         if robot in metres:
             yield f"{titled(robot)} drove {metres[robot]:,.0f} m a day."
         yield from _requests(run, robot, events)
-        yield from _searches(robot, _rows(run, "time_to_find", ["robot", "user", "end"]))
+        searches = rows_of_metric(run, "time_to_find", ["robot", "user", "end"])
+        yield from _searches(robot, searches)
 
 
 def _waking_share(user: str, events: Sequence[dict[str, Any]], steps: int) -> float | None:
@@ -128,8 +129,10 @@ def _waking_share(user: str, events: Sequence[dict[str, Any]], steps: int) -> fl
         if not is_own and event["user"] != user:
             continue
         if is_awake and not is_out:
-            waking += event["step"] - since
-            seen += event["step"] - since if seen_by else 0
+            steps = event["step"] - since
+            waking += steps
+            if seen_by:
+                seen += steps
         since = event["step"]
         match event["event"]:
             case EventKind.ACTIVITY if is_own:
@@ -146,14 +149,15 @@ def _waking_share(user: str, events: Sequence[dict[str, Any]], steps: int) -> fl
 def _learning(run: "Run") -> Iterator[str]:
     """Yield how wrong the beliefs about each user were at first, and how wrong at the end."""
     errors: dict[str, list[float]] = {}
-    for row in _rows(run, "ltp_error", ["user", "tv"]):
+    for row in rows_of_metric(run, "ltp_error", ["user", "tv"]):
         if row["user"] in run.manifest["entities"]["users"]:
             errors.setdefault(row["user"], []).append(row["tv"])
     if not errors or any(len(of_user) < 2 for of_user in errors.values()):
         return
-    first = _listed([f"{100 * own[0]:.0f} % of {titled(u)}'s" for u, own in errors.items()])
-    last = _listed([f"{100 * own[-1]:.0f} %" for own in errors.values()])
-    yield f"At first, what was learned put {first} time into wrong rooms; in the end {last}."
+    first = [f"{100 * own[0]:.0f} % of {titled(user)}'s" for user, own in errors.items()]
+    last = [f"{100 * own[-1]:.0f} %" for own in errors.values()]
+    wrong = f"{_listed(first)} time into wrong rooms; in the end {_listed(last)}"
+    yield f"At first, what was learned put {wrong}."
 
 
 def _requests(run: "Run", robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
@@ -201,16 +205,6 @@ def _period(simulated_s: float) -> str:
     return f"{days:.0f} days"
 
 
-def _rows(run: "Run", kind: str, columns: list[str]) -> list[dict[str, Any]]:
-    """Return the rows of the table of the first metric of a type; none if nothing measured it."""
-    configured = run.manifest["scenario"]["metrics"]
-    name = next((name for name in configured if configured[name]["type"] == kind), None)
-    if name is None or name not in run.tables:
-        return []
-    rows: list[dict[str, Any]] = run.tables[name].select(columns).to_pylist()
-    return rows
-
-
 def _result(run: "Run", kind: str) -> dict[str, Any]:
     """Return the result of the first metric of a type; empty if nothing measured it."""
     configured = run.manifest["scenario"]["metrics"]
@@ -225,4 +219,4 @@ def _listed(names: Sequence[str]) -> str:
     ('Ana, Ben and Cleo', 'Astro')
     """
     titles = [titled(name) for name in names]
-    return " and ".join([*([", ".join(titles[:-1])] if titles[:-1] else []), *titles[-1:]])
+    return " and ".join(filter(None, [", ".join(titles[:-1]), *titles[-1:]]))

@@ -114,10 +114,10 @@ def _mark(plan: FloorPlan, stage: Stage, evidence: VerdictEvidence, axes: Axes) 
         here = poses.get(body)
         there = other if isinstance(other, tuple) else poses.get(other)
         if here is not None and there is not None:
-            (x0, y0), (x1, y1) = here, there
-            axes.plot([x0, x1], [y0, y1], ls="--", lw=1.2, color=MARK_RGB, zorder=5)
-            label = f"{np.hypot(x1 - x0, y1 - y0):.2f} m"
-            middle = ((x0 + x1) / 2, (y0 + y1) / 2)
+            ends = np.array([here, there])
+            axes.plot(*ends.T, ls="--", lw=1.2, color=MARK_RGB, zorder=5)
+            label = f"{np.hypot(*np.diff(ends, axis=0)[0]):.2f} m"
+            middle = ends.mean(axis=0)
             box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
             axes.annotate(label, middle, color=MARK_RGB, fontsize=8, zorder=6, bbox=box)
 
@@ -126,7 +126,8 @@ def _draw_course(run: Run, course: SignalCourse, step: int, axes: Axes) -> None:
     """Draw a signal over the minutes around a step, in seconds from it, with its bound."""
     seconds = int(run.manifest["step_us"]) / 1e6
     reach = round(COURSE_S / seconds)
-    first, end = max(course.trace.first, step - reach), min(course.trace.end, step + reach)
+    first = max(course.trace.first, step - reach)
+    end = min(course.trace.end, step + reach)
     part = course.trace.since(first).until(end)
     at = (np.append(part.start, part.end) - step) * seconds
     value = np.where(np.isfinite(part.value), part.value, np.nan)

@@ -81,9 +81,12 @@ class TextStamps:
         if stamp is None:
             return
         rows, columns = stamp.rest.shape[:2]
-        top, left = round(self._height - y) + stamp.top, round(x) + stamp.left
-        low, high = max(0, top), min(pixels.shape[0], top + rows)
-        begin, end = max(0, left), min(pixels.shape[1], left + columns)
+        top = round(self._height - y) + stamp.top
+        left = round(x) + stamp.left
+        low = max(0, top)
+        high = min(pixels.shape[0], top + rows)
+        begin = max(0, left)
+        end = min(pixels.shape[1], left + columns)
         if low >= high or begin >= end:
             return
         part = np.s_[low - top : high - top, begin - left : end - left]
@@ -102,10 +105,9 @@ class TextStamps:
         key = (content, float(text.get_fontsize()))
         if key not in self._advances:
             # Measured between bars: blanks at the end of a text have no width.
-            with_text, without = (
-                self._renderer.get_text_width_height_descent(f"|{part}|", font, False)[0]
-                for part in (content, "")
-            )
+            measure = self._renderer.get_text_width_height_descent
+            with_text, *_ = measure(f"|{content}|", font, False)
+            without, *_ = measure("||", font, False)
             self._advances[key] = with_text - without
         return self._advances[key]
 
@@ -115,8 +117,10 @@ class TextStamps:
         self._renderer.clear()
         text.draw(self._renderer)
         box = text.get_window_extent(self._renderer)
-        left, right = max(0, int(box.x0) - EDGE), int(box.x1) + EDGE
-        top, bottom = max(0, int(self._height - box.y1) - EDGE), int(self._height - box.y0) + EDGE
+        left = max(0, int(box.x0) - EDGE)
+        right = int(box.x1) + EDGE
+        top = max(0, int(self._height - box.y1) - EDGE)
+        bottom = int(self._height - box.y0) + EDGE
         pixels = np.asarray(self._renderer.buffer_rgba())[top:bottom, left:right]
         if not pixels.any():
             return None
@@ -334,7 +338,8 @@ class ChangedPart(NamedTuple):
         """Paste the rectangle, as planes of brightness and of colours of half the size."""
         for part, plane in zip(parts, planes, strict=True):
             half = 1 if part is parts[0] else 2
-            top, left = self.top // half, self.left // half
+            top = self.top // half
+            left = self.left // half
             plane[top : top + part.shape[0], left : left + part.shape[1]] = part
 
 
@@ -362,12 +367,17 @@ def changed_parts(last: U8, pixels: U8) -> list[ChangedPart]:
     bands = np.split(rows, np.flatnonzero(np.diff(rows) > ROWS_BETWEEN) + 1)
     for band in bands if len(rows) else ():
         columns = np.flatnonzero(changed[band[0] : band[-1] + 1].any(axis=0))
-        top, left = (int(index[0]) // 2 * 2 for index in (band, columns))
-        bottom, right = (int(index[-1]) // 2 * 2 + 2 for index in (band, columns))
+        top, bottom = _even_ends(band)
+        left, right = _even_ends(columns)
         part = pixels[top:bottom, left:right].copy()
         last[top:bottom, left:right] = part
         parts.append(ChangedPart(top, left, part))
     return parts
+
+
+def _even_ends(places: NDArray[np.intp]) -> tuple[int, int]:
+    """Return the even numbers between which some sorted places are."""
+    return int(places[0]) // 2 * 2, int(places[-1]) // 2 * 2 + 2
 
 
 def _write_pictures(
@@ -385,10 +395,10 @@ def _write_pictures(
                 " higher --speed, a shorter stretch, or .mp4"
             )
         picture = Image.fromarray(pixels).convert("RGB")
+        if kind == "gif":
+            picture = picture.quantize(128, dither=Image.Dither.NONE)
         numbers.append(number)
-        pictures.append(
-            picture.quantize(128, dither=Image.Dither.NONE) if kind == "gif" else picture
-        )
+        pictures.append(picture)
     lengths = np.diff([*numbers, total]) * float(1000 / rate)
     durations = [max(20, round(length)) for length in lengths.tolist()]
     options = {"append_images": pictures[1:], "duration": durations, "loop": 0, "save_all": True}

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +155,5 @@ def free_directory(beside: Path | None) -> Path | None:
     if beside is None:
         return None
     root = beside.resolve()
-    taken = {path.name for path in root.parent.glob(f"{root.name}-branch-*")}
-    number = next(n for n in range(1, len(taken) + 2) if f"{root.name}-branch-{n}" not in taken)
-    return root.parent / f"{root.name}-branch-{number}"
+    paths = (root.with_name(f"{root.name}-branch-{number}") for number in count(1))
+    return next(path for path in paths if not path.exists())

@@ -214,7 +214,9 @@ BOXES = ("#e4d9c4", "#bfc9cc", "#d9c7a8")
 
 
 def _bed(s: Symbol) -> None:
-    x, back, front = s.wide / 2, -s.deep / 2, s.deep / 2
+    x = s.wide / 2
+    back = -s.deep / 2
+    front = s.deep / 2
     pillows = 2 if s.wide > 1.2 else 1
     pitch = (s.wide - 0.2) / pillows
     for number in range(pillows):
@@ -226,7 +228,9 @@ def _bed(s: Symbol) -> None:
 
 
 def _sofa(s: Symbol) -> None:
-    x, back, front = s.wide / 2, -s.deep / 2, s.deep / 2
+    x = s.wide / 2
+    back = -s.deep / 2
+    front = s.deep / 2
     seats = 3 if s.wide > 1.9 else 2
     pitch = (s.wide - 0.32) / seats
     for number in range(seats):
@@ -237,14 +241,16 @@ def _sofa(s: Symbol) -> None:
 
 
 def _table(s: Symbol) -> None:
-    x, y = s.wide / 2 - 0.06, s.deep / 2
+    x = s.wide / 2 - 0.06
+    y = s.deep / 2
     for number in range(int((s.deep - 0.14) / 0.17) + 1):
         along = -y + 0.14 + 0.17 * number
         s.add("line", (-x, along, x, along), edge="#ffffff3a")
 
 
 def _wardrobe(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
+    x = s.wide / 2
+    y = s.deep / 2
     doors = max(2, round(s.wide / 0.55))
     for number in range(1, doors):
         at = -x + s.wide * number / doors
@@ -252,7 +258,8 @@ def _wardrobe(s: Symbol) -> None:
 
 
 def _bookshelf(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
+    x = s.wide / 2
+    y = s.deep / 2
     for number in range(int((s.wide - 0.14) / 0.07)):
         left = -x + 0.05 + number * 0.07
         top = y - 0.06 - number % 3 * 0.02
@@ -261,7 +268,8 @@ def _bookshelf(s: Symbol) -> None:
 
 
 def _shelf(s: Symbol) -> None:
-    x, y = s.wide / 2, s.deep / 2
+    x = s.wide / 2
+    y = s.deep / 2
     for number in range(int((s.wide - 0.1) / 0.3)):
         left = -x + 0.06 + number * 0.3
         box = (left, -y + 0.06, left + 0.24, y - 0.05)

@@ -147,7 +147,8 @@ class PageData:
         with self._lock:
             path = self._temporary_folder / f"{step}.mp4"
             if not path.exists():
-                first, end = max(0, step - around), min(steps, step + around)
+                first = max(0, step - around)
+                end = min(steps, step + around)
                 write_film(self.run, path, first, end, speed=FILM_SPEED)
         return path
 
@@ -178,43 +179,42 @@ class PageData:
         table = self._poses() if self._walks_every_us else run.tables[KEY_FRAMES]
         entity, names = categories(table["entity"])
         kind, kinds = categories(table["kind"])
-        entities = run.manifest["entities"]
-        number = {name: i for i, name in enumerate((*entities["users"], *entities["robots"]))}
-        body = np.array([number.get(name, len(number)) for name in names], np.int64)[entity]
+        bodies = self._bodies
+        numbers = [bodies.index(name) if name in bodies else len(bodies) for name in names]
+        body = np.array(numbers, np.int64)[entity]
         order = np.argsort(body, kind="stable")
-        counts = np.bincount(body, minlength=len(number))[: len(number)]
+        counts = np.bincount(body, minlength=len(bodies))[: len(bodies)]
         order = order[: counts.sum()]
         home = self.facts["home"]
-        origin = home["origin_units"]
+        left, bottom = home["origin_units"]
         units = home["units_per_m"]
-        start = run.clock.stamp(0).astype(np.int64)
-        time, *xy, heading, step, away = (
-            values_of(table[name]) for name in ("time", "x", "y", "heading", "step", "away")
-        )
-        x, y = (np.floor(xy[i] * units + 0.5) - origin[i] for i in range(2))
-        heading = np.floor(heading * (TURN / math.tau) + 0.5).astype(np.int64)
-        planned = kind == (kinds.index("planned") if "planned" in kinds else len(kinds))
+        heading = np.floor(values_of(table["heading"]) * (TURN / math.tau) + 0.5)
+        planned = kinds.index("planned") if "planned" in kinds else len(kinds)
         parts: list[tuple[str, Any]] = [
-            ("<f8", time - start),
-            ("<i4", x),
-            ("<i4", y),
-            ("<i4", step),
-            ("<i2", heading % TURN),
-            ("u1", away),
-            ("u1", planned),
+            ("<f8", values_of(table["time"]) - run.clock.stamp(0).astype(np.int64)),
+            ("<i4", np.floor(values_of(table["x"]) * units + 0.5) - left),
+            ("<i4", np.floor(values_of(table["y"]) * units + 0.5) - bottom),
+            ("<i4", values_of(table["step"])),
+            ("<i2", heading.astype(np.int64) % TURN),
+            ("u1", values_of(table["away"])),
+            ("u1", kind == planned),
         ]
-        content = [values[order].astype(kind).tobytes() for kind, values in parts]
+        content = [values[order].astype(dtype).tobytes() for dtype, values in parts]
         return counts.astype("<f8").tobytes() + b"".join(content)
 
     def _poses(self) -> Any:
         """Return positions of everybody at equal intervals, in the columns of key_frames."""
         import pyarrow as pa
 
-        entities = self.run.manifest["entities"]
         interval = timedelta(microseconds=self._walks_every_us)
-        names = (*entities["users"], *entities["robots"])
-        parts = [positions(self.run, name, interval) for name in names]
+        parts = [positions(self.run, name, interval) for name in self._bodies]
         return pa.concat_tables(parts)
+
+    @property
+    def _bodies(self) -> list[str]:
+        """The names of users, then of robots."""
+        entities = self.run.manifest["entities"]
+        return [*entities["users"], *entities["robots"]]
 
 
 def compact_json(content: Any) -> bytes:
@@ -237,9 +237,13 @@ def write_table(table: Any, target: Path | io.BytesIO) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    names = {field.name: field.type for field in table.schema}
-    delta_names = [n for n, t in names.items() if pa.types.is_int64(t) or pa.types.is_timestamp(t)]
-    texts = [n for n, t in names.items() if pa.types.is_dictionary(t) or pa.types.is_string(t)]
+    delta_names = []
+    texts = []
+    for field in table.schema:
+        if pa.types.is_int64(field.type) or pa.types.is_timestamp(field.type):
+            delta_names.append(field.name)
+        if pa.types.is_dictionary(field.type) or pa.types.is_string(field.type):
+            texts.append(field.name)
     pq.write_table(
         table,
         target,

@@ -79,7 +79,8 @@ class Guard:
             port: The port of the server.
             seen_at: Another address under which browsers reach it, such as that of a proxy.
         """
-        self._app, self._token = app, token
+        self._app = app
+        self._token = token
         self._hosts = {f"{host}:{port}" for host in HOSTS}
         self._origins = {f"http://{host}" for host in self._hosts}
         if seen_at:

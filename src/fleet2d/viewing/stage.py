@@ -76,7 +76,8 @@ def draw_strip(run: Run, plan: FloorPlan, bodies: Sequence[BodyFacts], axes: Axe
     labels = room_labels(plan.rooms)
     for number, body in enumerate(bodies):
         for start, stop, room in _stretches(run.path(body["name"], interval), clock, end):
-            low, high = number, number + ROW_PART
+            low = number
+            high = number + ROW_PART
             boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
             faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
             if room >= 0 and stop - start > LABEL_PART * (end - begin):
@@ -429,7 +430,9 @@ class Stage:
         rest = self._postures.at(body.facts["name"], step * self._step_us)
         body.lies = rest is not None and rest["posture"] == "lie"
         if rest is not None:
-            x, y, heading = rest["x"], rest["y"], rest["heading"]
+            x = rest["x"]
+            y = rest["y"]
+            heading = rest["heading"]
         body.place = (x, y)
         if body.facts["cameras"]:
             self._look(body, (x, y, heading), step)

@@ -1,5 +1,6 @@
 """Moments of a run that are worth a look: found by the run itself, for the page and the report."""
 
+import math
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from itertools import pairwise
@@ -53,11 +54,16 @@ def story_of(run: Run) -> list[StoryFacts]:
     """Return moments of a run in their order: firsts, lasts and longests. Empty without events."""
     try:
         events = _events_of(run)
-        found = [*_requests(events), *_searches(events, run.clock), *_people(run, events)]
-        found += [*_learning(run), *_failure(run)]
+        moments = [
+            *_requests(events),
+            *_searches(events, run.clock),
+            *_people(run, events),
+            *_learning(run),
+            *_failure(run),
+        ]
     except ArtifactError:  # the run's notes say which table is damaged
         return []
-    return sorted(found, key=lambda moment: moment["step"])
+    return sorted(moments, key=lambda moment: moment["step"])
 
 
 def _events_of(run: Run) -> list[StoredEvent]:
@@ -66,7 +72,8 @@ def _events_of(run: Run) -> list[StoredEvent]:
     table = run.tables["events"]
     if "user" not in table.schema.names:  # nobody lives there
         return []
-    rows = table.filter(compute.is_in(compute.cast(table["event"], "string"), string_array(KINDS)))
+    kinds = compute.cast(table["event"], "string")
+    rows = table.filter(compute.is_in(kinds, string_array(KINDS)))
     columns = [_words(rows[name]) for name in StoredEvent._fields[1:]]
     steps = values_of(rows["step"]).tolist()
     return list(map(StoredEvent._make, zip(steps, *columns, strict=True)))
@@ -183,25 +190,31 @@ def _nights(
 
 def _learning(run: Run) -> Iterator[StoryFacts]:
     """Yield the moment from which the beliefs of long-term presence hardly got better."""
-    configured = run.manifest["scenario"]["metrics"]
-    name = next((name for name in configured if configured[name]["type"] == "ltp_error"), None)
-    if name is None or name not in run.tables:
+    rows = rows_of_metric(run, "ltp_error", ["step", "user", "tv"])
+    rows = [row for row in rows if row["user"] == rows[-1]["user"]]
+    errors = [row["tv"] for row in rows]
+    if len(errors) < 3 or any(error is None or math.isnan(error) for error in errors):
         return
-    rows = run.tables[name].select(["step", "user", "tv"]).to_pylist()
-    user = rows[-1]["user"] if rows else ""
-    errors = [(row["step"], row["tv"]) for row in rows if row["user"] == user]
-    if len(errors) < 3 or any(error is None or error != error for _, error in errors):
-        return
-    last = errors[-1][1]
+    last = errors[-1]
     settled = len(errors) - 1
-    while settled > 0 and errors[settled - 1][1] <= SETTLED * last:
+    while settled > 0 and errors[settled - 1] <= SETTLED * last:
         settled -= 1
     if 0 < settled < len(errors) - 1:
         below = f"{100 * SETTLED * last:.0f} %"
         end = f"{100 * last:.0f} % at the end"
         words = f"They are wrong by less than {below} from here on, and by {end}"
         title = "The beliefs have settled"
-        yield StoryFacts(step=errors[settled][0], title=title, words=words, who=[])
+        yield StoryFacts(step=rows[settled]["step"], title=title, words=words, who=[])
+
+
+def rows_of_metric(run: Run, kind: str, columns: list[str]) -> list[dict[str, Any]]:
+    """Return the rows of the table of the first metric of a type; none if nothing measured it."""
+    configured = run.manifest["scenario"]["metrics"]
+    name = next((name for name in configured if configured[name]["type"] == kind), None)
+    if name is None or name not in run.tables:
+        return []
+    rows: list[dict[str, Any]] = run.tables[name].select(columns).to_pylist()
+    return rows
 
 
 def _failure(run: Run) -> Iterator[StoryFacts]:

@@ -84,7 +84,8 @@ class Dataset:
 
     def __init__(self, root: Path, manifest: DatasetManifest) -> None:
         """Read nothing yet; `open_dataset` opens a data set."""
-        self.root, self.manifest = root, manifest
+        self.root = root
+        self.manifest = manifest
 
     def __repr__(self) -> str:
         """Return its folder and splits."""

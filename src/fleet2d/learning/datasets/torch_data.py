@@ -62,7 +62,9 @@ class TorchWindows(IterableDataset):  # type: ignore[misc]
         self, parts: Callable[[int, int], Iterator[Windows]], shuffle: int, seed: int
     ) -> None:
         """Keep the source of windows, by number of the worker and of all workers."""
-        self._parts, self._shuffle, self._seed = parts, shuffle, seed
+        self._parts = parts
+        self._shuffle = shuffle
+        self._seed = seed
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield the windows of this worker."""

@@ -226,7 +226,8 @@ def share_of(logit: float) -> float:
 class Constant(Factor):
     """The same factor for every row."""
 
-    lower, upper = (-SURE_LOGIT,), (SURE_LOGIT,)
+    lower = (-SURE_LOGIT,)
+    upper = (SURE_LOGIT,)
     starts = ((2.0,),)
 
     def __init__(self, name: str, rows: int) -> None:
@@ -272,7 +273,8 @@ class Orientation(Factor):
     """
 
     names = ("side", "back")
-    lower, upper = (-SURE_LOGIT, -SURE_LOGIT), (SURE_LOGIT, SURE_LOGIT)
+    lower = (-SURE_LOGIT, -SURE_LOGIT)
+    upper = (SURE_LOGIT, SURE_LOGIT)
     starts = ((2.0, 1.0),)
 
     def __init__(self, degrees: F64) -> None:

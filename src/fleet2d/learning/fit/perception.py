@@ -369,7 +369,8 @@ def _at(estimates: dict[str, ParameterEstimate], distance: float) -> float:
     top = estimates["top"].value
     if "distance midpoint" not in estimates:
         return top
-    midpoint, width = (estimates[f"distance {name}"].value for name in ("midpoint", "width"))
+    midpoint = estimates["distance midpoint"].value
+    width = estimates["distance width"].value
     share: float = top / (1 + np.exp(np.clip((distance - midpoint) / width, -700, 700)))
     return float(share)
 

@@ -4,6 +4,8 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -267,7 +269,8 @@ def _recorded_day(timeline: Timeline, day: LivedDay, names: Sequence[str]) -> Re
     asleep = sleep_states(timeline)
     entries.append((bed, "sleep"))
     for up in day.up:
-        begin, end = 60 * up.begin, 60 * (up.begin + up.length)
+        begin = 60 * up.begin
+        end = 60 * (up.begin + up.length)
         for state, at, _ in runs(flat[midnight + begin : midnight + end]):
             if state >= 0:
                 entries.append((begin + at, "sleep" if state in asleep else names[state]))
@@ -276,9 +279,9 @@ def _recorded_day(timeline: Timeline, day: LivedDay, names: Sequence[str]) -> Re
     last = [entry for entry in ordered if entry[0] < next_wake - NO_SLEEP_S]
     if last[-1][1] != "sleep":
         last.append((next_wake - NO_SLEEP_S, "sleep"))
-    changes = [e for i, e in enumerate(last) if not i or e[1] != last[i - 1][1]]
+    changes = [next(same) for _, same in groupby(last, key=itemgetter(1))]
     begins, activities = zip(*changes, strict=True)
-    return RecordedDay(tuple(begins), tuple(activities), next_wake)
+    return RecordedDay(begins, activities, next_wake)
 
 
 def _time_by_state(done: Iterable[Stretch]) -> Counter[int]:

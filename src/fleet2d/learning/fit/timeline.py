@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import timedelta
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -142,7 +143,7 @@ def read_seconds(
         visit_end = visits[number + 1].first if number + 1 < len(visits) else visit.last + 1
         place = "entryway" if visit.place == DOOR else visit.place
         parts = [(max(step, 0), label) for step, label in visit.activities] or [(visit.first, "")]
-        for (step, label), (end, _) in zip(parts, [*parts[1:], (visit_end, "")], strict=True):
+        for (step, label), (end, _) in pairwise([*parts, (visit_end, "")]):
             name = room_type(label) if label else ""
             state = ActivityPlace("away" if place == AWAY and not name else name, place)
             seconds[step:end] = index.setdefault(state, len(index))
@@ -296,19 +297,19 @@ def find_days(timeline: Timeline) -> list[LivedDay]:
     nights |= _nights_away(timeline, nights)
     days = []
     for number in range(len(timeline.minutes)):
-        before, after = nights.get(number - 1), nights.get(number)
-        if before is None or after is None or before[1] >= after[0]:
+        before = nights.get(number - 1)
+        after = nights.get(number)
+        if before is None or after is None:
             continue
+        _, wake = before
+        bed, next_wake = after
         midnight = number * DAY_MINUTES
-        if before[1] < midnight:
-            continue
-        awake = _runs(flat, before[1], after[0], midnight)
-        night = _runs(flat, after[0], after[1], midnight)
-        up = tuple(r for r in night if not asleep[midnight + r.begin])
-        wake = before[1] - midnight
-        bed = after[0] - midnight
-        next_wake = after[1] - midnight
-        days.append(LivedDay(number, wake, bed, next_wake, awake, up))
+        if midnight <= wake < bed:
+            awake = _runs(flat, wake, bed, midnight)
+            night = _runs(flat, bed, next_wake, midnight)
+            up = tuple(run for run in night if not asleep[midnight + run.begin])
+            times = (wake - midnight, bed - midnight, next_wake - midnight)
+            days.append(LivedDay(number, *times, awake, up))
     return days
 
 
@@ -317,13 +318,12 @@ def _nights(asleep: Bool, days: int) -> dict[int, tuple[int, int]]:
 
     Night -1 is the one before the first day.
     """
-    sleeps = [[begin, begin + n] for value, begin, n in runs(asleep.astype(np.int16)) if value]
     joined: list[list[int]] = []
-    for begin, end in sleeps:
-        if joined and begin - joined[-1][1] <= MAX_NIGHT_WAKING:
-            joined[-1][1] = end
-        else:
-            joined.append([begin, end])
+    for is_sleep, begin, length in runs(asleep.astype(np.int16)):
+        if is_sleep and joined and begin - joined[-1][1] <= MAX_NIGHT_WAKING:
+            joined[-1][1] = begin + length
+        elif is_sleep:
+            joined.append([begin, begin + length])
     nights: dict[int, tuple[int, int]] = {}
     for begin, end in joined:
         number = ((begin + end) // 2 - NOON) // DAY_MINUTES
@@ -465,7 +465,8 @@ def wasserstein(a: F64, b: F64) -> float:
     >>> wasserstein(np.array([1.0, 2.0]), np.array([2.0, 5.0]))
     2.0
     """
-    a, b = (sample if len(sample) else np.zeros(1) for sample in (a, b))
+    a = a if len(a) else np.zeros(1)
+    b = b if len(b) else np.zeros(1)
     points = np.sort(np.concatenate([a, b]))
     below_a = np.searchsorted(a, points[:-1], side="right") / len(a)
     below_b = np.searchsorted(b, points[:-1], side="right") / len(b)

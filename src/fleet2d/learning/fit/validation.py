@@ -58,10 +58,13 @@ def sample_persona(
     for day in range(days + 1):  # the first night is of the day before the first
         ordinal = MONDAY - 1 + day
         for episode in life.day(ordinal):
-            begin, end = day * DAY_S + episode.begin, day * DAY_S + episode.end
+            begin = day * DAY_S + episode.begin
+            end = day * DAY_S + episode.end
             states[begin:end] = fitted.states[episode.activity]
             rooms[begin:end] = place_of[episode.activity]
-    states, rooms = (labels[DAY_S : (days + 1) * DAY_S] for labels in (states, rooms))
+    whole_days = slice(DAY_S, (days + 1) * DAY_S)
+    states = states[whole_days]
+    rooms = rooms[whole_days]
     if to_second:
         return states.reshape(days, -1), rooms.reshape(days, -1)
     return by_minute(states, len(timeline.states)), by_minute(rooms, len(places))

@@ -46,7 +46,8 @@ class RobotLife:
         self.due = run_until_asked(simulation, *robots)
 
     def _follow(self, simulation: Simulation, robots: tuple[str, ...]) -> None:
-        self.simulation, self.robots = simulation, robots
+        self.simulation = simulation
+        self.robots = robots
         actors = simulation.actors
         self._actors = {robot: actors[robot] for robot in robots}
         self._now: dict[str, Situation] = {}  # at the newest step at which each was asked for
@@ -158,7 +159,10 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         self.reward: Any = self.variants.task.reward if reward is None else reward
         if not callable(self.reward):
             self.reward = checked(Document({"reward": self.reward}, {})).reward
-        self.split, self.masked, self.truth, self.render_mode = split, masked, truth, render_mode
+        self.split = split
+        self.masked = masked
+        self.truth = truth
+        self.render_mode = render_mode
         variant = self.variants.first(self.split)
         self.robot = robot or variant.robots[0]
         self.robots: tuple[str, ...] = (self.robot,)  # those that have to choose in its lives
@@ -205,7 +209,8 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
 
     def join(self, life: RobotLife) -> None:
         """Go on in a life, which other robots may share."""
-        self.life, self._step = life, life.simulation.step
+        self.life = life
+        self._step = life.simulation.step
         self._terms = {} if callable(self.reward) else life.terms(self.robot)
 
     def step(self, action: Any) -> tuple[F32, float, bool, bool, dict[str, Any]]:

@@ -104,7 +104,8 @@ class Variants:
     """The scenarios of a task, with the newest ones kept."""
 
     def __init__(self, task: LearningTask, overrides: tuple[str, ...] = ()) -> None:
-        self.task, self.overrides = task, overrides
+        self.task = task
+        self.overrides = overrides
         PLAN_CACHE.grow(HOMES)
         HOME_CACHE.grow(HOMES)
         self._load: Callable[[tuple[str, ...]], LifeScenario] = lru_cache(KEPT)(self._read)

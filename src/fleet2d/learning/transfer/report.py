@@ -12,7 +12,7 @@ from fleet2d.learning.transfer.driver import DAYS_TABLE
 from fleet2d.learning.transfer.specification import ARMS
 from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.storage.files import write_atomically
-from fleet2d.studies.intervals import student_quantile
+from fleet2d.studies.intervals import satterthwaite, student_quantile
 from fleet2d.studies.reader import Study
 from fleet2d.viewing.pictures.floorplan import write_picture
 
@@ -67,12 +67,11 @@ def over_days(homes: Sequence[Sequence[float]]) -> tuple[float, float, float]:
     mean = sum_in_order(means) / len(means)
     if min(map(len, homes)) < 2:  # one day tells nothing of others
         return mean, math.nan, math.nan
-    squares = [float(np.var(v, ddof=1)) / len(v) / len(homes) ** 2 for v in homes]
-    variance = sum_in_order(squares)
+    variances = [float(np.var(v, ddof=1)) / len(v) / len(homes) ** 2 for v in homes]
+    variance = sum_in_order(variances)
     if not variance:
         return mean, mean, mean
-    parts = zip(squares, homes, strict=True)
-    freedom = variance**2 / sum_in_order(square**2 / (len(v) - 1) for square, v in parts)
+    freedom = satterthwaite(variances, [len(values) - 1 for values in homes])
     reach = student_quantile(freedom) * math.sqrt(variance)
     return mean, mean - reach, mean + reach
 
@@ -153,7 +152,8 @@ def sentences_of(study: Study, task: str) -> list[str]:
         if not (_has(study, task, against) and _has(study, task, arm)):
             continue
         rows = compared(study, task, against).filter(arm=arm, learner=learner).to_dicts()
-        found += [_sentence(task, against, arm, rows)] if rows else []
+        if rows:
+            found.append(_sentence(task, against, arm, rows))
     return found
 
 

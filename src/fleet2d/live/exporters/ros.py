@@ -86,7 +86,8 @@ class RosMessages:
         """
         self.types = ros_types("ROS messages need rosbags")
         self._encode = MessageEncoder(self.types).encode
-        self._records, self._margin = records, margin
+        self._records = records
+        self._margin = margin
         self._templates: dict[tuple[str, ...], Template] = {}
         self._run = records.run
         clock = self._run.clock

@@ -108,7 +108,8 @@ def _poses(chunk: Chunk, rooms: list[str], clock: Clock) -> Iterator[dict[str, A
             if not away:
                 row |= {"x": float(way.x[i]), "y": float(way.y[i])}
                 row |= {"heading": float(way.heading[i])}
-                row |= {"room": rooms[way.room[i]]} if way.room[i] >= 0 else {}
+                if way.room[i] >= 0:
+                    row["room"] = rooms[way.room[i]]
             yield row | {"away": away}
 
 

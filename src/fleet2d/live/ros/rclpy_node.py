@@ -138,7 +138,9 @@ class RclpyAction:
         stamp: Callable[[], Fields],
     ) -> None:
         """Begin without goals."""
-        self._begin, self._cancel, self._stamp = begin, cancel, stamp
+        self._begin = begin
+        self._cancel = cancel
+        self._stamp = stamp
         self._goals: dict[str, tuple[ActionGoal, Any, Any]] = {}  # with handle and future
         self._lock = threading.RLock()
         self._cls: Any = None

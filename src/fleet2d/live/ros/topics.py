@@ -29,7 +29,9 @@ PERSON_M = (0.4, 0.4, 1.7)
 """The box of a detected person, whose true size no robot knows: x, y, z [m]."""
 UNKNOWN = "unknown"
 """The class of a detected person who wasn't recognized."""
-_CHARGING, _DISCHARGING, _NOT_CHARGING = 1, 2, 3  # of sensor_msgs/msg/BatteryState
+_CHARGING = 1  # of sensor_msgs/msg/BatteryState
+_DISCHARGING = 2
+_NOT_CHARGING = 3
 
 
 class RosTopic(NamedTuple):

@@ -11,7 +11,9 @@ from fleet2d.live.ros.node import ActionGoal, ActionStatus, Fields
 
 # Of goals that are over, so many are remembered: clients ask for their results.
 MAX_GOALS = 1000
-_NONE, _UNKNOWN_GOAL, _IS_OVER = 0, 2, 3  # of action_msgs/srv/CancelGoal
+_NONE = 0  # of action_msgs/srv/CancelGoal
+_UNKNOWN_GOAL = 2
+_IS_OVER = 3
 Reply = Callable[[Fields], None]
 
 
@@ -52,8 +54,11 @@ class ZenohAction:
             cancel: Called with a goal that a client withdraws; `finish` is expected later.
             stamp: Returns the present time.
         """
-        self._feedback, self._states = feedback, states
-        self._begin, self._cancel, self._stamp = begin, cancel, stamp
+        self._feedback = feedback
+        self._states = states
+        self._begin = begin
+        self._cancel = cancel
+        self._stamp = stamp
         self._goals: dict[str, _AcceptedGoal] = {}
         self._lock = threading.RLock()
 

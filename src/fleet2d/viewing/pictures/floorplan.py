@@ -364,7 +364,8 @@ def save_figure(figure: Figure, path: Path) -> None:
 def figure_size(plan: FloorPlan) -> tuple[float, float]:
     """Return the width and height of a figure that the plan fills [in]."""
     x0, x1, y0, y1 = _limits(plan)
-    width, height = x1 - x0, y1 - y0
+    width = x1 - x0
+    height = y1 - y0
     scale = LONG_SIDE_IN / max(width, height)
     return max(width * scale, SHORT_SIDE_IN), max(height * scale, SHORT_SIDE_IN)
 
@@ -504,7 +505,8 @@ def _floor_colors(room: Room, x: F64, y: F64, *, patterned: bool) -> F64:
     if material in ("carpet", "plain") or not patterned:
         return colors
     if material == "tiles":
-        column, row = x // pitch, y // pitch
+        column = x // pitch
+        row = y // pitch
         paler = 0.45 * _noise(column, row)[:, None]
         colors += (1 - colors) * paler
         is_joint = (x % pitch < JOINT_M) | (y % pitch < JOINT_M)
@@ -543,7 +545,8 @@ def _draw_borders(plan: FloorPlan, axes: Axes) -> None:
     rooms = plan.room_of_cell
     lines = []
     for flip, grid in ((False, rooms), (True, rooms.T)):
-        low, high = grid[:-1], grid[1:]
+        low = grid[:-1]
+        high = grid[1:]
         meets = (low != high) & (low != NO_ROOM) & (high != NO_ROOM)
         changes = np.diff(meets.astype(np.int8), prepend=0, append=0)
         line, first = np.nonzero(changes == 1)
@@ -637,7 +640,8 @@ def _write_room(plan: FloorPlan, room: Room, label: str, empty: I16, axes: Axes)
 def _middle(cells: Bool) -> tuple[int, int]:
     """Return the (row, column) in the middle of the cells that are deepest inside."""
     rows, columns = np.nonzero(cells)
-    top, left = int(rows.min()), int(columns.min())
+    top = int(rows.min())
+    left = int(columns.min())
     window = cells[top : rows.max() + 1, left : columns.max() + 1]  # small in a large home
     depth = squared_distance(np.pad(window, 1))[rows - top + 1, columns - left + 1]
     is_deep = depth >= MIDDLE_DEPTH * depth.max()

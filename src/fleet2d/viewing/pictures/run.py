@@ -123,7 +123,8 @@ def hours_shown(rooms: I16) -> tuple[float, float]:
     simulated = np.flatnonzero((rooms != NOT_SIMULATED).any(axis=0))
     if len(rooms) > 1 or len(simulated) == 0:
         return 0.0, 24.0
-    first, last = simulated[0] * 24 / BINS, (simulated[-1] + 1) * 24 / BINS
+    first = simulated[0] * 24 / BINS
+    last = (simulated[-1] + 1) * 24 / BINS
     if last - first > 12:
         return 0.0, 24.0
     return float(np.floor(first * 4) / 4), float(np.ceil(last * 4) / 4)
@@ -358,7 +359,10 @@ class _Picture:
         """Choose the size of the plan, and with it that of the picture."""
         x0, y0, x1, y1 = self.plan.bounds
         edge = 0.03 * max(x1 - x0, y1 - y0)
-        left, right, low, high = x0 - edge, x1 + edge, y0 - scale_depth(self.plan), y1 + edge
+        left = x0 - edge
+        right = x1 + edge
+        low = y0 - scale_depth(self.plan)
+        high = y1 + edge
         self.right = ACTOGRAMS[len(self.panels)]
         beside = 2 * EDGE + self.right + (GAP if self.right else 0.0)
         most = WIDTH - beside
