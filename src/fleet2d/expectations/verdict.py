@@ -279,8 +279,9 @@ def _sums_at_end(expectation: Expectation) -> Expectation:
         return expectation
     if (per := expectation.signal.per) is not None:
         raise InputError(
-            f"{expectation} says nothing of each {per}: write always({expectation}), which judges"
-            f" each step by its {per} so far, or at_end({expectation}) for the last {per} alone"
+            f"{expectation} says nothing of each {per}: write always(…) around it, or never(…)"
+            f" around its opposite, which judge each step by its {per} so far (a share with `of`"
+            f" is missing before that), or at_end(…) for the last {per} alone"
         )
     return at_end(expectation)
 
