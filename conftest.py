@@ -9,10 +9,12 @@ import pytest
 
 # Examples in docstrings of modules that need an extra run where it is installed.
 EXTRAS = {
-    "gymnasium": "src/fleet2d/learning/gym",
-    "torch": "src/fleet2d/learning/datasets/torch_data.py",
+    "src/fleet2d/learning/gym": "gymnasium",
+    "src/fleet2d/learning/datasets/torch_data.py": "torch",
+    "src/fleet2d/learning/datasets/training.py": "torch",
+    "src/fleet2d/learning/transfer/presence.py": "torch",
 }
-collect_ignore = [path for package, path in EXTRAS.items() if find_spec(package) is None]
+collect_ignore = [path for path, package in EXTRAS.items() if find_spec(package) is None]
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from tests.hostile.test_archives import BOMBS
 from tests.learning.datasets.small import SOURCE, make
+from tests.learning.transfer.homes import write_home
 from tests.scenes import TESTS, process
 from tests.thorough import some
 
@@ -68,6 +69,12 @@ FILES = {
         },
     },
     "people.yaml": SOURCE,
+    "homes.yaml": {
+        "homes": {"one": {"path": "one.txt"}},
+        "tasks": ["presence"],
+        "arms": ["own"],
+        "days": [1],
+    },
 }
 
 
@@ -79,6 +86,7 @@ def folder(tmp_path_factory):
         (root / name).write_text(yaml.safe_dump(content))
     (root / "hiding").mkdir()
     (root / "hiding" / "sitecustomize.py").write_text(HIDING)
+    write_home(root / "one.txt", 8)
     (root / "net.onnx").write_bytes((BOMBS / "pol-good.onnx").read_bytes())
     (root / "log.csv").write_text("distance,bearing,detected\n1,0,1\n" * 60)
     for name in ("plan.svg", "plan.dxf", "plan.ifc"):
@@ -109,6 +117,11 @@ LACKING = [
     ("study report st", "matplotlib", "viz"),
     ("study report st", "polars", "polars|study"),
     ("study tune tune.yaml --out tuned", "optuna", "tune"),
+    ("dataset train --on data --out weights.npz", "", "ml"),
+    ("dataset train --on people.yaml --out own.npz", "torch", "ml"),
+    ("dataset score data --tune 1", "", "ml"),
+    ("dataset score data --task ltp --task rtp --tune 1", "torch", "ml"),
+    ("transfer homes.yaml --out transferred", "torch", "ml"),
     ("dataset score data --picture forecasts.png", "", "viz"),
     ("live home.yaml --with ws://127.0.0.1:0 --speed 0", "", "live"),
     ("live home.yaml --with rosbridge://127.0.0.1:9 --speed 0", "", "rosbridge"),
@@ -141,7 +154,7 @@ PLAIN = (
     "run home.yaml --out plain", "validate home.yaml", "test home.yaml",
     "verify run", "verify run --again", "export run run.csv", "export run run.html", "components",
     "dataset make people.yaml --out plain-data --workers 1", "dataset score data",
-    "dataset train --on data --out weights.npz --epochs 1",
+    "dataset score data --task ltp --tune 1",
     "live home.yaml --with udp://127.0.0.1:0 --speed 0",
 )  # fmt: skip
 

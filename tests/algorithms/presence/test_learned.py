@@ -14,8 +14,7 @@ from fleet2d.algorithms.presence.learned import WEIGHTS, LearnedModel, Weights, 
 from fleet2d.errors import Fleet2DError, InputError
 from fleet2d.learning.datasets.specification import plan_dataset
 from fleet2d.learning.datasets.tables import tables_of
-from fleet2d.learning.datasets.training import predict
-from fleet2d.learning.datasets.windows import windows_of
+from fleet2d.learning.datasets.windows import predict, windows_of
 from fleet2d.metrics.rtp_score import calibration_error
 
 LEARNED = {"rtp": {"type": "real_time_presence", "model": "learned"}}

@@ -12,7 +12,6 @@ from fleet2d.learning.datasets.tasks import (
     LOWER_END,
     UPPER_END,
     LeaderboardEntry,
-    Networks,
     SplitForecasts,
     _difference,
     leaderboard,
@@ -75,17 +74,6 @@ def made(folder: Path, duration, *users, **keys) -> Dataset:
 
 def models(entries: list[LeaderboardEntry]) -> list[tuple[str, int]]:
     return [(entry.model, entry.cases) for entry in entries]
-
-
-@pytest.mark.slow
-def test_tuned_networks_are_scored_on_the_days_after_those_that_tuned_them(tmp_path):
-    data = made(tmp_path, "2 d", ["retired"], beliefs=["routine"], every="1 h")
-
-    entries = leaderboard(data, split="part0", networks=Networks(tune=1))
-
-    assert models(entries) == [("routine", 24), ("learned", 24), ("learned, tuned", 24)]
-    assert entries[1].scores != entries[2].scores
-    assert leaderboard(data, split="part0", networks=Networks(tune=2)) == []
 
 
 @pytest.mark.slow

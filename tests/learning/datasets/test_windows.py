@@ -85,7 +85,7 @@ def test_the_truth_is_in_no_feature(tables):
 def test_windows_equal_those_of_the_model_in_the_loop():
     """The features of a data set and those that the model computes as the run goes are the same."""
     from fleet2d.algorithms.presence.learned import shipped_weights
-    from fleet2d.learning.datasets.training import predict
+    from fleet2d.learning.datasets.windows import predict
 
     run = fleet2d.run(
         "bundled:paper",

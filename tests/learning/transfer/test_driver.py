@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 import yaml
 from tests.learning.transfer.homes import write_home
-from tests.thorough import THOROUGH
 
 from fleet2d.errors import RunDirectoryError, ScenarioError
 from fleet2d.learning.datasets import generate
@@ -135,19 +134,6 @@ def test_an_example_can_be_trained_and_scored(examples, fleet2d, name):
     code, out, err = fleet2d("transfer", examples / f"{name}.yaml", "--dry-run")
     assert 0 == code, err
     assert int(out.split()[0]) > 50
-
-
-@pytest.mark.skipif(not THOROUGH, reason="a minute of simulation and training")
-def test_the_small_example_tells_its_result_of_real_homes(examples, fleet2d):
-    pytest.importorskip("sklearn", reason="needs the extra transfer")
-    code, out, _ = fleet2d("transfer", examples / "small.yaml", "--out", examples / "small")
-    assert 0 == code
-    *sentences, last = out.splitlines()
-    assert last.startswith("44 of 44 cells, 0 left out")
-    assert ["room in 60 min", "presence"] == list(
-        dict.fromkeys(s.partition(",")[0] for s in sentences)
-    )
-    assert (examples / "small" / "presence.png").exists()
 
 
 def test_people_who_fit_into_no_home_are_left_out_with_their_cells(

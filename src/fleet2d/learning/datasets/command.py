@@ -98,6 +98,7 @@ def train_network(
 
     The data set of a YAML file is made beside the weights, once: learned_data for learned.npz. If a
     data set has a split `test`, the weights are scored on it in the end, beside the shipped ones.
+    It needs PyTorch: pip install "fleet2d[ml]".
 
     Examples:
       fleet2d dataset train --on presence --out rtp.npz

@@ -27,8 +27,7 @@ from fleet2d.configuration.problems import check_known
 from fleet2d.errors import InputError, errors_as
 from fleet2d.kernels import F64, I64, Bool
 from fleet2d.learning.datasets.reader import Dataset
-from fleet2d.learning.datasets.training import fine_tune, predict
-from fleet2d.learning.datasets.windows import PRIOR, Windows, windows_of
+from fleet2d.learning.datasets.windows import PRIOR, Windows, predict, windows_of
 from fleet2d.metrics.rtp_score import (
     GAP_ENDS,
     GAPS,
@@ -125,11 +124,13 @@ def leaderboard(
         networks: What `rtp` scores, too.
 
     Raises:
-        InputError: There is no such task or split.
+        InputError: There is no such task or split, or networks are tuned without torch.
     """
     for task in tasks:
         check_known(task, "task", TASKS, InputError)
     names = tasks or [t for t in TASKS if t == "rtp" or TRAIN in data.splits]
+    if networks.tune and "rtp" in names:
+        import fleet2d.learning.datasets.training  # noqa: F401 - an error before scores, without torch
     with _agreeing(data, split):
         return [
             LeaderboardEntry(task, model, scores, cases)
@@ -204,7 +205,12 @@ def forecasts(data: Dataset, split: str, networks: Networks = SHIPPED) -> SplitF
     """Return the stored beliefs of a split, those of `learned`, tuned or not, and of networks.
 
     None if the split has no windows.
+
+    Raises:
+        InputError: Networks are tuned without torch.
     """
+    if networks.tune:
+        from fleet2d.learning.datasets.training import fine_tune
     parts = [part for part in windows(data, split) if len(part.truth)]
     if not parts:
         return None

@@ -1,15 +1,21 @@
-"""Training of the network of `model: learned`: gradients by hand, with nothing but NumPy."""
+"""Training of the network of `model: learned`, by PyTorch; what is trained runs without it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from math import log
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fleet2d.algorithms.presence.learned import PLACE_FEATURES, TRUSTS, Weights, trust_class
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, extra
 from fleet2d.kernels import TRACE_FEATURES, PlaceNetwork
-from fleet2d.learning.datasets.windows import Windows, joined
+from fleet2d.learning.datasets.windows import Windows, joined, predict
+
+with extra("ml", "training a network needs torch"):
+    import torch
+    from torch.nn.functional import cross_entropy
 
 FLOOR = 1e-6
 # The factors of the correction that fine-tuning tries.
@@ -17,9 +23,6 @@ FACTORS = tuple(k / 10 for k in range(16))
 CAUTION = 0.05  # log loss that a factor of 0 or of 2 must gain
 # By gap: lowest log loss for simulated people who were left out, a persona at a time.
 TRUST = (1.0, 0.9, 0.85, 0.8, 0.75, 0.55)
-# of Adam
-BETA_1 = 0.9
-BETA_2 = 0.999
 
 
 @dataclass(frozen=True)
@@ -62,10 +65,30 @@ class WindowBatch(NamedTuple):
     truth: Any
     gap: Any
 
+    def rows(self, chosen: Any) -> "WindowBatch":
+        """Return some of the windows."""
+        return WindowBatch(*(part[chosen] for part in self))
+
 
 Parameters = dict[str, Any]
 
 
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Compute on one thread of the processor, whatever PyTorch is set to elsewhere.
+
+    One thread adds in the same order each time, and more gain nothing with so few weights.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        with torch.enable_grad(), torch.device("cpu"):
+            yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+@_undisturbed()
 def train(
     training: Iterable[Windows],
     validation: Iterable[Windows] = (),
@@ -73,7 +96,9 @@ def train(
     start: Weights | None = None,
     on_epoch: Any = None,
 ) -> Weights:
-    """Train a network to have the lowest log loss, by Adam.
+    """Train a network to have the lowest log loss, by AdamW.
+
+    The same seed gives the same weights on one machine.
 
     Args:
         training: The windows to learn from.
@@ -91,31 +116,44 @@ def train(
     if not batches:
         raise InputError("there are no windows to train on: no label has a stored belief")
     mean, scale = _scales(batches)
-    batches, checks = (
-        [batch._replace(inputs=(batch.inputs - mean) / scale) for batch in part]
-        for part in (batches, checks)
-    )
-    random = np.random.default_rng(settings.seed)
-    values = _initial(random, settings.hidden) if start is None else _unfolded(start, mean, scale)
-    anchor = {k: np.zeros_like(v) if start is None else v.copy() for k, v in values.items()}
-    counted = np.array(settings.trust) if start is None else start.trust
-    trust = np.ones(TRUSTS) if start is None else counted
-    trust = trust.astype(np.float32)
-    moments = {name: [np.zeros_like(v), np.zeros_like(v)] for name, v in values.items()}
-    step = 0
+    for batch in [*batches, *checks]:
+        batch.inputs.sub_(mean).div_(scale)
+    random = torch.Generator().manual_seed(settings.seed)
+    # What is trained is the difference to the anchor, so the decay of weights pulls back to it.
+    if start is None:
+        change = _initial(random, settings.hidden)
+        anchor = {name: torch.zeros_like(value) for name, value in change.items()}
+        counted = np.array(settings.trust)
+        trust = torch.ones(TRUSTS, dtype=torch.float32)
+    else:
+        anchor = _unfolded(start, mean, scale)
+        change = {name: torch.zeros_like(value) for name, value in anchor.items()}
+        counted = start.trust
+        trust = _tensor(counted)
+    for value in change.values():
+        value.requires_grad_()
+    steps = torch.optim.AdamW(change.values(), settings.rate, weight_decay=settings.decay)
     total = settings.epochs * len(batches)
+
+    def share_of_rate(done: int) -> float:
+        step = done + 1
+        return min(10 * step / total, 1) * (1 - step / total)
+
+    rates = torch.optim.lr_scheduler.LambdaLR(steps, share_of_rate)
     for epoch in range(settings.epochs):
         losses = []
-        for k in random.permutation(len(batches)):
-            loss, gradient = _gradient(values, batches[k], trust)
-            losses.append(loss)
-            step += 1
-            rate = settings.rate * min(10 * step / total, 1) * (1 - step / total)
-            values = _adam(values, gradient, moments, step, rate, settings.decay, anchor)
-        loss = float(np.mean(losses))
+        for k in torch.randperm(len(batches), generator=random).tolist():
+            loss = _losses(_sum(anchor, change), batches[k], trust)
+            losses.append(_told(loss))
+            steps.zero_grad()
+            loss.mean().backward()
+            steps.step()
+            rates.step()
+        known = float(torch.stack([part.mean() for part in losses]).mean())
         if on_epoch is not None:
-            on_epoch(epoch, loss, _loss(values, checks, counted) if checks else loss)
-    return _folded(values, mean, scale)._replace(trust=counted)
+            values = _sum(anchor, change)
+            on_epoch(epoch, known, _loss(values, checks, _tensor(counted)) if checks else known)
+    return _folded(_sum(anchor, change), mean, scale)._replace(trust=counted)
 
 
 def fine_tune(weights: Weights, windows: Iterable[Windows]) -> Weights:
@@ -137,12 +175,6 @@ def fine_tune(weights: Weights, windows: Iterable[Windows]) -> Weights:
     return train(days, settings=settings, start=weights._replace(trust=weights.trust * factor))
 
 
-def predict(weights: Weights, windows: Windows) -> Any:
-    """Return the belief of a network in each window: float64 (windows, places), away last."""
-    places = weights.of_places(windows.places)
-    return weights.probabilities(places, windows.features.astype(np.float64))
-
-
 def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
     """Return batches of windows of homes with as many places, in a fixed random order."""
     batches = []
@@ -154,107 +186,72 @@ def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
         inputs = np.concatenate(inputs_of_homes)
         truth = np.concatenate([w.truth for w in group])
         gap = trust_class(inputs[..., PLACE_FEATURES:])
-        order = np.random.default_rng(places).permutation(len(truth))
-        batches += [
-            WindowBatch(inputs[rows], inputs[rows, :, -1], truth[rows], gap[rows])
-            for rows in np.array_split(order, -(-len(order) // size))
-        ]
+        arrays = (inputs, inputs[..., -1], truth, gap)
+        whole = WindowBatch(*(torch.from_numpy(array) for array in arrays))
+        order = torch.randperm(len(truth), generator=torch.Generator().manual_seed(places))
+        batches += [whole.rows(rows) for rows in order.tensor_split(-(-len(order) // size))]
     return batches
 
 
 def _scales(batches: list[WindowBatch]) -> tuple[Any, Any]:
     """Return the mean and the standard deviation of each feature."""
-    rows = np.concatenate([b.inputs.reshape(-1, b.inputs.shape[2]) for b in batches[::4]])
-    scale = rows.std(axis=0, dtype=np.float64).astype(np.float32)
-    return rows.mean(axis=0, dtype=np.float64).astype(np.float32), np.maximum(scale, 1e-2)
+    rows = torch.cat([batch.inputs.flatten(0, 1) for batch in batches[::4]]).double()
+    scale, mean = torch.std_mean(rows, dim=0, correction=0)
+    return mean.float(), scale.float().clamp(min=1e-2)
 
 
-def _initial(random: np.random.Generator, hidden: int) -> Parameters:
+def _initial(random: Any, hidden: int) -> Parameters:
     width = PLACE_FEATURES + TRACE_FEATURES
 
     def normal(*shape: int) -> Any:
-        return random.normal(0, np.sqrt(2 / shape[0]), shape).astype(np.float32)
+        drawn = torch.randn(shape, generator=random, dtype=torch.float32)
+        return drawn * (2 / shape[0]) ** 0.5
 
     return {
         "first": normal(width, hidden),
-        "start": np.zeros(hidden, np.float32),
+        "start": torch.zeros(hidden, dtype=torch.float32),
         "second": normal(hidden, hidden),
         "context": normal(hidden, hidden) / 2,
-        "bias": np.zeros(hidden, np.float32),
-        "score": np.zeros(hidden, np.float32),  # so it begins with the belief that it corrects
+        "bias": torch.zeros(hidden, dtype=torch.float32),
+        # So it begins with the belief that it corrects.
+        "score": torch.zeros(hidden, dtype=torch.float32),
     }
 
 
-def _forward(values: Parameters, batch: WindowBatch, trust: Any) -> tuple[Any, Any, Any, Any]:
-    inner = np.maximum(batch.inputs @ values["first"] + values["start"], 0)
-    mean = inner.mean(axis=1)
-    outer = inner @ values["second"] + (mean @ values["context"] + values["bias"])[:, None]
-    outer = np.maximum(outer, 0)
+def _sum(anchor: Parameters, change: Parameters) -> Parameters:
+    return {name: value + change[name] for name, value in anchor.items()}
+
+
+def _losses(values: Parameters, batch: WindowBatch, trust: Any) -> Any:
+    """Return the log loss of each window."""
+    inner = (batch.inputs @ values["first"] + values["start"]).relu()
+    home = inner.mean(dim=1) @ values["context"] + values["bias"]
+    outer = (inner @ values["second"] + home[:, None]).relu()
     score = outer @ values["score"] * trust[batch.gap, None] + batch.prior
-    score = np.exp(score - score.max(axis=1, keepdims=True))
-    return inner, mean, outer, score / score.sum(axis=1, keepdims=True)
+    return cross_entropy(score, batch.truth, reduction="none")
 
 
-def _gradient(values: Parameters, batch: WindowBatch, trust: Any) -> tuple[float, Parameters]:
-    inner, mean, outer, belief = _forward(values, batch, trust)
-    count, places, hidden = inner.shape
-    rows = np.arange(count)
-    loss = -float(np.log(np.maximum(belief[rows, batch.truth], FLOOR)).mean())
-    error = belief.copy()
-    error[rows, batch.truth] -= 1
-    error *= trust[batch.gap, None] / count
-    to_outer = error[..., None] * values["score"] * (outer > 0)
-    to_mean = to_outer.sum(axis=1)
-    to_inner = to_outer @ values["second"].T + (to_mean @ values["context"].T)[:, None] / places
-    to_inner *= inner > 0
-    flat = to_inner.reshape(-1, hidden)
-    return loss, {
-        "first": batch.inputs.reshape(-1, batch.inputs.shape[2]).T @ flat,
-        "start": flat.sum(axis=0),
-        "second": inner.reshape(-1, hidden).T @ to_outer.reshape(-1, hidden),
-        "context": mean.T @ to_mean,
-        "bias": to_mean.sum(axis=0),
-        "score": (error[..., None] * outer).sum(axis=(0, 1)),
-    }
-
-
-def _adam(
-    values: Parameters,
-    gradient: Parameters,
-    moments: dict[str, list[Any]],
-    step: int,
-    rate: float,
-    decay: float,
-    anchor: Parameters,
-) -> Parameters:
-    """Return the parameters after a step; they are pulled back to `anchor` by `decay`."""
-    made = {}
-    for name, value in values.items():
-        first, second = moments[name]
-        first += (1 - BETA_1) * (gradient[name] - first)
-        second += (1 - BETA_2) * (gradient[name] ** 2 - second)
-        change = first / (1 - BETA_1**step) / (np.sqrt(second / (1 - BETA_2**step)) + 1e-8)
-        made[name] = value - rate * (change + decay * (value - anchor[name]))
-    return made
+def _told(losses: Any) -> Any:
+    """Return log losses as people are told them: at most that of `FLOOR`."""
+    return losses.detach().clamp(max=-log(FLOOR))
 
 
 def _loss(values: Parameters, batches: list[WindowBatch], trust: Any) -> float:
-    total = count = 0.0
-    for batch in batches:
-        belief = _forward(values, batch, trust)[3][np.arange(len(batch.truth)), batch.truth]
-        total -= float(np.log(np.maximum(belief, FLOOR)).sum())
-        count += len(batch.truth)
-    return total / count
+    return float(torch.cat([_told(_losses(values, batch, trust)) for batch in batches]).mean())
+
+
+def _tensor(array: Any) -> Any:
+    return torch.from_numpy(array.astype(np.float32))
 
 
 def _folded(values: Parameters, mean: Any, scale: Any) -> Weights:
     """Return the parameters as weights of features that aren't scaled."""
-    wide = {name: value.astype(np.float64) for name, value in values.items()}
-    first = wide["first"] / scale[:, None]
+    wide = {name: value.detach().double().numpy() for name, value in values.items()}
+    first = wide["first"] / scale.numpy()[:, None]
     network = PlaceNetwork(
         first[PLACE_FEATURES:], wide["second"], wide["context"], wide["bias"], wide["score"]
     )
-    start = wide["start"] - mean @ first
+    start = wide["start"] - mean.numpy() @ first
     return Weights(first[:PLACE_FEATURES], start, np.ones(TRUSTS), network)
 
 
@@ -262,11 +259,11 @@ def _unfolded(weights: Weights, mean: Any, scale: Any) -> Parameters:
     """Return weights as parameters of scaled features."""
     first = np.concatenate([weights.places, weights.network.first])
     values = {
-        "first": first * scale[:, None],
-        "start": weights.start + mean @ first,
+        "first": first * scale.numpy()[:, None],
+        "start": weights.start + mean.numpy() @ first,
         "second": weights.network.second,
         "context": weights.network.context,
         "bias": weights.network.bias,
         "score": weights.network.score,
     }
-    return {name: value.astype(np.float32) for name, value in values.items()}
+    return {name: _tensor(value) for name, value in values.items()}

@@ -11,7 +11,7 @@ import pyarrow as pa
 from fleet2d.algorithms.evidence import steps_of_bin
 from fleet2d.algorithms.presence.belief import ANYONE, AWAY
 from fleet2d.algorithms.presence.estimator import natural_log
-from fleet2d.algorithms.presence.learned import GAP, PlaceFacts
+from fleet2d.algorithms.presence.learned import GAP, PlaceFacts, Weights
 from fleet2d.bounds import ENTRIES, TABLE_BYTES
 from fleet2d.errors import InputError
 from fleet2d.kernels import (
@@ -248,3 +248,9 @@ def joined(parts: Iterable[Windows]) -> dict[int, list[Windows]]:
         if len(part.truth):
             groups.setdefault(len(part.places), []).append(part)
     return groups
+
+
+def predict(weights: Weights, windows: Windows) -> F64:
+    """Return the belief of a network in each window: float64 (windows, places), away last."""
+    places = weights.of_places(windows.places)
+    return weights.probabilities(places, windows.features.astype(np.float64))

@@ -14,7 +14,6 @@ import pyarrow as pa
 from fleet2d.configuration.problems import counted
 from fleet2d.errors import ScenarioError
 from fleet2d.learning.transfer.learners import Forecast, forecast
-from fleet2d.learning.transfer.presence import presence_forecast
 from fleet2d.learning.transfer.sources import PRESENCE, Sources
 from fleet2d.learning.transfer.specification import Cell, TransferPlan
 from fleet2d.logs.log import files_of
@@ -82,6 +81,8 @@ class CellJob:
     def _outcome(self, cell: Cell) -> VariantOutcome:
         sources = self.sources
         if cell.task == PRESENCE:
+            from fleet2d.learning.transfer.presence import presence_forecast
+
             found = presence_forecast(sources, cell)
         else:
             asked = sources.of_days(cell, sources.tested[cell.home])
@@ -150,11 +151,13 @@ def run_transfer(
 
     Raises:
         InputError: The folder can't be used, holds other results, or people don't fit into homes;
-            with `skip`, if that leaves no cell.
+            with `skip`, if that leaves no cell. Or a package is not installed.
         KeyboardInterrupt: Ctrl-C; cells that are scored are stored.
     """
     import polars as pl
 
+    if any(cell.task == PRESENCE for cell in plan.cells):
+        import fleet2d.learning.datasets.training  # noqa: F401 - an error before data, without torch
     observer = observer or Observer()
     directory = StudyDirectory(location)
     directory.check_empty()

@@ -6,8 +6,8 @@ import numpy as np
 
 from fleet2d.algorithms.presence.learned import TRUSTS
 from fleet2d.kernels import F64, I64
-from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, predict, train
-from fleet2d.learning.datasets.windows import PRIOR, Windows
+from fleet2d.learning.datasets.training import TrainingSettings, fine_tune, train
+from fleet2d.learning.datasets.windows import PRIOR, Windows, predict
 from fleet2d.learning.transfer.learners import Forecast
 from fleet2d.learning.transfer.sources import Sources
 from fleet2d.learning.transfer.specification import Cell
