@@ -276,6 +276,11 @@ class SightMemory(NamedTuple):
     backlog: I64  # (cameras, rows, columns): a ring buffer of sightings that aren't known yet
     waiting: I64  # (cameras, 2): first row and length of the backlog
 
+    def waiting_rows(self, camera: int) -> I64:
+        """Return the rows of a camera's backlog with sightings that aren't known yet, in order."""
+        begin, length = self.waiting[camera].tolist()
+        return (begin + np.arange(length)) % max(1, self.backlog.shape[1])
+
 
 class DetectionRule(NamedTuple):
     """The settings that all cameras of a robot share."""

@@ -309,7 +309,8 @@ class Settings(DescribedModel):
     @classmethod
     def _explain(cls, line: InitErrorDetails, data: Any) -> InitErrorDetails:
         """Return an error with the list of known keys, or an example of the expected list."""
-        kind, (key, *inner_keys) = line["type"], line["loc"] or ("",)
+        kind = line["type"]
+        key, *inner_keys = line["loc"] or ("",)
         if kind == "extra_forbidden" and not inner_keys:
             line["type"] = unknown_key(key, cls.model_fields)
         lacks_item = kind == "missing" and len(inner_keys) == 1 and isinstance(inner_keys[0], int)

@@ -5,7 +5,7 @@ that are written in Python.
 """
 
 import math
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, NamedTuple
@@ -45,7 +45,14 @@ from fleet2d.kernels import ViewQueryColumn as Query
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.runtime.events import Event, new_event
 from fleet2d.runtime.local_time import even_parts, stamp_us
-from fleet2d.sight.camera import Disturbance, TableContext, error_tables, is_perfect, stack_lenses
+from fleet2d.sight.camera import (
+    Camera,
+    Disturbance,
+    TableContext,
+    error_tables,
+    is_perfect,
+    stack_lenses,
+)
 from fleet2d.sight.fov import FieldOfView
 from fleet2d.sight.perception import Perception
 
@@ -205,11 +212,7 @@ class Cameras(Watcher):
         units = lattice.units_per_m
         with errors_as(ScenarioError, owner.path, of=ValueError):
             lenses = [camera.lens(units, clock.step_us) for camera in cameras.values()]
-        common = getattr(owner.entity, "perception", None)  # users have no errors
-        perceptions = [camera.perception or common for camera in cameras.values()]
-        _check_spots(owner, perceptions)
-        for c, disturbance in self._disturbed():
-            perceptions[c] = disturbance.errs or perceptions[c]
+        perceptions = self._perceptions_of(cameras.values())
         has_errors = [not is_perfect(perception) for perception in perceptions]
         self.drift = _drift_of(owner)
         radii = [other.entity.radius * units for other in self.others]
@@ -222,12 +225,7 @@ class Cameras(Watcher):
         self._patience = max(lens.patience for lens in lenses)
         errors = [p if errs else None for p, errs in zip(perceptions, has_errors, strict=True)]
         self.errors = error_tables(lenses, errors, context)
-        self._dark = [c for c, disturbance in self._disturbed() if disturbance.dark]
-        self.lenses.widest[self._dark] = NO_RANGE
-        self.errors.has_ghosts[self._dark] = 0
-        chances = self.lenses.chance
-        for c, disturbance in self._disturbed():
-            chances[c] = round(Fraction(int(chances[c])) * Fraction(disturbance.detection))
+        self._dim()
         self.sighting_errors = None
         if self.drift is not None or any(p and p.errors for p in perceptions):
             from fleet2d.engine.sighting_errors import SightingErrors  # few runs need them
@@ -238,6 +236,25 @@ class Cameras(Watcher):
         if not self.activity_senses:  # later ones would not fit the tables of the run
             self._sense_activities(perceptions)
         return self._inject()
+
+    def _perceptions_of(self, cameras: Iterable[Camera]) -> list[Perception | None]:
+        """Return the errors of each camera: those of disturbances come before its own."""
+        common = getattr(self.owner.entity, "perception", None)  # users have no errors
+        perceptions = [camera.perception or common for camera in cameras]
+        _check_spots(self.owner, perceptions)
+        for c, disturbance in self._disturbed():
+            perceptions[c] = disturbance.errs or perceptions[c]
+        return perceptions
+
+    def _dim(self) -> None:
+        """Let disturbances darken cameras, or make it less likely that they notice somebody."""
+        self._dark = [c for c, disturbance in self._disturbed() if disturbance.dark]
+        self.lenses.widest[self._dark] = NO_RANGE
+        self.errors.has_ghosts[self._dark] = 0
+        chances = self.lenses.chance
+        for c, disturbance in self._disturbed():
+            chance = Fraction(int(chances[c])) * Fraction(disturbance.detection)
+            chances[c] = round(chance)
 
     def _inject(self) -> SightMemory:
         """Set the false sightings of interventions; return an empty memory with room for them."""
@@ -566,10 +583,10 @@ def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemor
     rows = max(memory.backlog.shape[1], longest)
     backlog = np.zeros((len(about), rows, len(SightingColumn)), np.int64)
     waiting = np.zeros_like(old.waiting)
-    for c, (begin, length) in enumerate(old.waiting.tolist()):
-        places = (begin + np.arange(length)) % max(1, old.backlog.shape[1])
-        backlog[c, :length] = old.backlog[c, places]
-        waiting[c, 1] = length
+    for c in range(len(about)):
+        rows_of_old = old.waiting_rows(c)
+        backlog[c, : len(rows_of_old)] = old.backlog[c, rows_of_old]
+        waiting[c, 1] = len(rows_of_old)
     return SightMemory(old.noticed, old.seen, about, backlog, waiting)
 
 

@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING
 from fleet2d.configuration.problems import check_known
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.state import State
-from fleet2d.entities.body import NEVER
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.equipment import Displacement
 from fleet2d.entities.power import EMPTY, KEPT, MAP, Power, Updates, power_of
 from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import ScenarioError, errors_as
 from fleet2d.interventions.intervention import Intervention
-from fleet2d.kernels import turn_between
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import Event, EventKind
@@ -74,9 +72,7 @@ def _was_carried(actor: DecidingActor, step: int) -> bool:
     if before == after:
         return False
     if getattr(actor.entity, "localization", None) is not None:
-        turn = turn_between(after.heading, before.heading)
-        moved = before.x - after.x, before.y - after.y, turn
-        actor.displacements.append(Displacement(step, NEVER, *moved))
+        actor.displacements.append(Displacement.since(step, before, after))
     return True
 
 

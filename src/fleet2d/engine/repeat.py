@@ -272,7 +272,8 @@ def _fields(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Return the fields of two manifests that differ and shouldn't."""
     fields = []
     for name in sorted(old.keys() - _COMPARED_APART - set(Manifest.varying())):
-        before, after = old.get(name), new.get(name)
+        before = old.get(name)
+        after = new.get(name)
         if before == after:
             continue
         if isinstance(before, dict) and isinstance(after, dict):

@@ -160,13 +160,13 @@ class SightingErrors:
             window: The poses of all bodies, from the first step of the span on.
             end: The step after the last one of the span.
         """
-        rows, identities = rows.copy("K"), rows[:, Column.IDENTITY]
+        identities = rows[:, Column.IDENTITY]
+        rows = rows.copy("K")
         poses: tuple[I64, ...] = ()
         for c in range(len(self._cameras)):
             here = np.flatnonzero(rows[:, Column.CAMERA] == c)
-            begin, length = memory.waiting[c].tolist()
-            places = (begin + np.arange(length)) % max(1, memory.backlog.shape[1])
-            part = np.concatenate([rows[here], memory.backlog[c, places]])
+            waiting = memory.waiting_rows(c)
+            part = np.concatenate([rows[here], memory.backlog[c, waiting]])
             looks = part[:, Column.STEP] - self._lenses.latency[c]
             is_new = looks >= window.first
             if not is_new.any():
@@ -176,7 +176,7 @@ class SightingErrors:
             body = poses[0][at], poses[1][at], poses[2][at]
             part[is_new] = self._change(c, part[is_new], looks[is_new], body, memory)
             rows[here] = part[: len(here)]
-            memory.backlog[c, places] = part[len(here) :]
+            memory.backlog[c, waiting] = part[len(here) :]
         is_kept = rows[:, Column.USER] != RETRACTED
         has_others = bool((rows[:, Column.IDENTITY] != identities).any())
         differs = has_others or not is_kept.all()

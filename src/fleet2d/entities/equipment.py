@@ -12,10 +12,19 @@ from fleet2d import kernels
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import AngleDeg, Length, PositiveDuration, Share, micros
-from fleet2d.entities.body import Body, Motion, Track
+from fleet2d.entities.body import NEVER, Body, Motion, Pose, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
-from fleet2d.kernels import BELL_STD, F64, I64, TURN, BatteryState, Breakpoints, Window
+from fleet2d.kernels import (
+    BELL_STD,
+    F64,
+    I64,
+    TURN,
+    BatteryState,
+    Breakpoints,
+    Window,
+    turn_between,
+)
 from fleet2d.runtime.clock import MINUTE_US
 from fleet2d.runtime.determinism import stream_key
 from fleet2d.runtime.events import EventKind
@@ -216,6 +225,12 @@ class Displacement(NamedTuple):
     x: int
     y: int
     turn: int
+
+    @classmethod
+    def since(cls, step: int, believed: Pose, true: Pose) -> "Displacement":
+        """Return the one that begins at a step, as a robot isn't where it believes to be."""
+        turn = turn_between(true.heading, believed.heading)
+        return cls(step, NEVER, believed.x - true.x, believed.y - true.y, turn)
 
 
 class Offsets(NamedTuple):

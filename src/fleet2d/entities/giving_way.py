@@ -333,7 +333,8 @@ def yielder(actor: Actor, beat_us: int = 1) -> Yielder:
         beat_us: If it is late, it leaves a stop at a multiple of that [us].
     """
     space = actor.space
-    is_plain = actor.drive is None and not actor.slows and actor.step_off(*actor.state[:2]) is None
+    drives_plainly = actor.drive is None and not actor.slows
+    is_plain = drives_plainly and actor.step_off(*actor.state.position) is None
     routes = space.shortest if is_plain else None
     walk = partial(_way, actor)
     return Yielder(actor.row, space.mesh, routes, actor.speed, actor.turn_rate, beat_us, walk)
@@ -425,12 +426,14 @@ def plan_here(
     if interrupted.is_random_walk:
         return None
     home = now.actor.home.plan
-    room = home.room_of_point(*now.actor.state[:2])
+    room = home.room_of_point(*now.actor.state.position)
+
+    def is_here(x: int, y: int) -> bool:
+        return home.room_of_point(x, y) == room
+
     met_us = (met_at + 1) * interrupted.step_us
     body = yielder(now.actor, beat_us)
-    continued = timelines.way_from_here(
-        body, now.step, met_us, lambda x, y: home.room_of_point(x, y) == room
-    )
+    continued = timelines.way_from_here(body, now.step, met_us, is_here)
     return None if continued is None else plan_along(now, interrupted, continued)
 
 

@@ -126,11 +126,11 @@ class Steering:
     def _way(self, body: Body, plan: Plan) -> I64:
         units = body.home.lattice.units_per_m
         wanted = self.velocity.within_limits(body)
-        x, y, heading = (
-            FINE * at + rest
-            for at, rest in zip((plan.x, plan.y, plan.heading), self.first.rest, strict=True)
-        )
-        at = plan.x, plan.y
+        rest_x, rest_y, rest_heading = self.first.rest
+        x = FINE * plan.x + rest_x
+        y = FINE * plan.y + rest_y
+        heading = FINE * plan.heading + rest_heading
+        at = plan.position
         is_free = True
         rows = []
         duration_us = micros(self.duration)

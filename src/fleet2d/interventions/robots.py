@@ -18,7 +18,6 @@ from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.plan import Room
 from fleet2d.interventions.bodies import BodyIntervention, Put, behavior_number, heading_of
 from fleet2d.interventions.intervention import Lasting, World, body, robot, user
-from fleet2d.kernels import turn_between
 from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting, dark_cameras
 from fleet2d.sight.perception import Perception
@@ -658,17 +657,14 @@ class Kidnap(Trouble):
         before = actor.state
         self._put.begin(world)
         if getattr(actor.entity, "localization", None) is not None:
-            after = actor.state
             displacements = actor.displacements
-            x, y = before.x - after.x, before.y - after.y
-            turn = turn_between(after.heading, before.heading)
+            moved = Displacement.since(world.step, before, actor.state)
             last = displacements[-1] if displacements else None
             if last is not None and last.end > world.step:  # carried off again before it knew
                 displacements[-1] = last._replace(end=world.step)
-                x = x + last.x
-                y = y + last.y
-                turn = turn + last.turn
-            displacements.append(Displacement(world.step, NEVER, x, y, turn))
+                turn = moved.turn + last.turn
+                moved = moved._replace(x=moved.x + last.x, y=moved.y + last.y, turn=turn)
+            displacements.append(moved)
         super().begin(world)
 
     @property

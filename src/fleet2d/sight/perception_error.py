@@ -192,10 +192,11 @@ class CameraSightings:
         angle = kernels.rounded(turns)
         along = sines[(angle + 2 * QUARTER) % (2 * TURN)] / UNIT * stretch
         up = sines[angle % (2 * TURN)] / UNIT * stretch
-        dx, dy = self.x - self.camera_x, self.y - self.camera_y
-        return self.replace(
-            x=self.camera_x + (dx * along - dy * up), y=self.camera_y + (dx * up + dy * along)
-        )
+        dx = self.x - self.camera_x
+        dy = self.y - self.camera_y
+        x = self.camera_x + (dx * along - dy * up)
+        y = self.camera_y + (dx * up + dy * along)
+        return self.replace(x=x, y=y)
 
     def uniform(self, purpose: str, *, at: ArrayLike | None = None, shared: bool = False) -> F64:
         """Return random numbers from 0 to 1, 1 excluded: float64 (n,).
