@@ -67,8 +67,8 @@ ASIDE_TRIES = 12
 NO_WAITS = np.zeros(0, np.int64)
 
 # Whose motion counts.
-OWN = 1
-OTHERS = 2
+OWN_MOTION = 1
+OTHERS_MOTION = 2
 
 
 class GivenWay(NamedTuple):
@@ -159,7 +159,7 @@ class Yielding(Watcher):
         ]
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step at which a robot has to react: not the first of the span."""
+        """Return the step after the span's first at which a robot has to react, or `end`."""
         step = self.next_step
         first = step + 1
         while first < end:
@@ -243,14 +243,14 @@ class Yielding(Watcher):
         self._strangers = np.zeros_like(self._near[:1])  # those who don't yield
         self._strangers[:, self._rows] = -1
         self._reach = self._near + SUB  # with room to move
-        self._alone = np.full(touch.shape, OWN, np.uint8)
+        self._alone = np.full(touch.shape, OWN_MOTION, np.uint8)
         self._counts = np.zeros_like(self._alone)
         self._polite = self._near.copy()
         people = slice(self._users)
         for number, row in enumerate(self.rows):
             gives_way = getattr(actors[row].entity, "gives_way", None)
             if gives_way is not None:  # `Clearance` lets it mind people that stand
-                self._counts[number, people] = OTHERS
+                self._counts[number, people] = OTHERS_MOTION
                 self._polite[number, people] = lattice(gives_way.distance)[number, people]
         self._passing = self._each(self._near, self._nothing)
         self._politely = self._each(self._polite, self._nothing)
@@ -324,7 +324,7 @@ class Yielding(Watcher):
             lead[i, self._rows] = 0
             near[i, self._rows] = self._least[i, self._rows]
             hard[i, self._rows] = 0
-            counts[i, self._rows] = OWN
+            counts[i, self._rows] = OWN_MOTION
         for (row, other), patience in self._patience.items():
             if patience.until <= step:
                 continue
@@ -332,7 +332,7 @@ class Yielding(Watcher):
             lead[i, other] = -1 if patience.ignores else 0
             near[i, other] = self._least[i, other]
             hard[i, other] = 0
-            counts[i, other] = OWN if other in self._number else self._counts[i, other]
+            counts[i, other] = OWN_MOTION if other in self._number else self._counts[i, other]
         for number, is_stuck in enumerate(self._stuck):
             if is_stuck:
                 lead[number] = -1
@@ -347,7 +347,7 @@ class Yielding(Watcher):
                 lead=np.where(first, 0, self._ahead),
                 near=np.where(first, self._least, self._near),
                 hard=np.where(first, 0, self._hard),
-                counts=np.where(first, OWN, self._counts).astype(np.uint8),
+                counts=np.where(first, OWN_MOTION, self._counts).astype(np.uint8),
             )
             self._without_patience = swapped, kept
         return self._without_patience[1]
@@ -380,7 +380,7 @@ class Yielding(Watcher):
     def _goes_first(self, row: int, other: int, step: int) -> bool:
         """Return whether a robot only has to stop before another one, and needn't yield."""
         counts = self._present(step).counts
-        return other in self._number and bool(counts[self._number[row], other] == OWN)
+        return other in self._number and bool(counts[self._number[row], other] == OWN_MOTION)
 
     def _have_patience(
         self, now: Situation, other: int, steps: int, *, ignores: bool = False

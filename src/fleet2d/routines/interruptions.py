@@ -178,8 +178,8 @@ def interruption_rules(
     """
     numbers = {name: number for number, name in enumerate(activities)}
 
-    def step(name: str, chance: float, takes: DurationDistribution | None = None) -> StepRow:
-        return numbers[name], _chance(chance), _quantiles(takes or activities[name].takes)
+    def step(name: str, chance: float, duration: DurationDistribution | None = None) -> StepRow:
+        return numbers[name], _chance(chance), _quantiles(duration or activities[name].takes)
 
     def of(names: Sequence[str]) -> list[int] | None:
         return sorted({numbers[name] for name in names}) or None

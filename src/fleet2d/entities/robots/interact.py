@@ -277,7 +277,7 @@ class Interact(BeliefBehavior):
         return all(until is None or until <= now.time for until in rests)
 
     def _look_for_somebody(self, now: Situation, ready: list[Request]) -> Plan | None:
-        """Look for the person of one of some requests, if likely at home; None: of none."""
+        """Plan a search for the first requested person who is likely at home; None: nobody is."""
         for request in ready:
             to = request.to
             if not self.seek or not request.interaction.seek:
@@ -331,7 +331,7 @@ class Interact(BeliefBehavior):
         since, best = self.best_so_far.get(request.text, (request.since, 0.0))
         best = best if since == request.since else 0.0
         # It is asked at the first moment whose chance exceeds a threshold drawn for the request.
-        chance = max(0.0, (self._welcome(now, self.timing, request) - best) / (1 - best))
+        chance = max(0.0, (self._asking_probability(now, self.timing, request) - best) / (1 - best))
         is_drawn = now.random(f"timing {request.text}").uniform() < chance
         best = 0.0 if is_drawn else best + chance * (1 - best)
         self.best_so_far[request.text] = request.since, best
@@ -339,8 +339,8 @@ class Interact(BeliefBehavior):
         now.requests.opportunities.append((now.step, text))
         return is_drawn
 
-    def _welcome(self, now: Situation, timing: str, request: Request) -> float:
-        """Return with which probability an algorithm would ask now; 1 before its first output.
+    def _asking_probability(self, now: Situation, timing: str, request: Request) -> float:
+        """Return the probability that an algorithm asks now; 1 before its first output.
 
         Raises:
             ComponentError: Its output has no such probabilities.
