@@ -58,7 +58,7 @@ class PlannedNote(NamedTuple):
 
 
 def notes_of(actor: DecidingActor, kind: str) -> list[PlannedNote]:
-    """Return the notes of a kind in the plan of a body."""
+    """Return the notes of one kind in a body's plan, each with its step."""
     step_of = actor.clock.step_at_or_after
     notes = actor.plan.notes
     return [PlannedNote(step_of(n.time_us), actor.row, n.detail) for n in notes if n.event == kind]

@@ -364,7 +364,7 @@ class Cameras(Watcher):
         return perfect
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step after the first event that ends the span, `end` if there is none."""
+        """Return the step after the first event that ends the span, or `end` if there is none."""
         if end <= self.next_step:
             return end
         self._ahead = self._look(bodies, end)
@@ -540,8 +540,8 @@ class PerfectCameras(Cameras):
 class Look(NamedTuple):
     """The result of a look up to step `looked` - 1, and the memory before it.
 
-    The span ends at `end`, which is earlier if an error changed who was seen when. `newest` is of
-    each identity the number of the last sighting among the distinct ones, -1 for none.
+    The span ends at `end`, which is earlier if an error changed who was seen when. `newest` has,
+    for each identity, the number of its last sighting among the distinct ones, or -1 for none.
     """
 
     looked: int

@@ -83,7 +83,7 @@ class BlockedWays(Watcher):
     waits = is_needed
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step at which a body has to decide: not the first of the span."""
+        """Return the step after the span's first at which a body has to decide, or `end`."""
         first = self.next_step
         block = bodies.block(first, end + 1)  # a move leads to the step after
         places = block.x, block.y, block.away
@@ -238,7 +238,7 @@ class Clearance(Watcher):
     waits = is_needed
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step at which a robot has to decide: not the first of the span."""
+        """Return the step after the span's first at which a robot has to decide, or `end`."""
         first = self.next_step
         block = bodies.block(first, end + 1)  # a move leads to the step after
         people = slice(0, len(self._users))

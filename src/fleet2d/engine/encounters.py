@@ -178,7 +178,7 @@ class Encounters(Watcher):
         self._calls += [call for call in notes_of(actor, EventKind.CALLS) if call.step == step]
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step after the first encounter, `end` if there is none."""
+        """Return the step after the first encounter, or `end` if there is none."""
         first = self.next_step
         block = bodies.block(first, end)
         self._ahead = [event for pair in self.pairs for event in pair.scan(block, end - first)]

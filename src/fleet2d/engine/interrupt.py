@@ -100,7 +100,7 @@ class Interruptions(Watcher):
         self._held = {wait: self._held.get(wait) for wait in waits}
 
     def limit(self, bodies: Bodies, end: int) -> int:
-        """Return the step after the first interruption, `end` if there is none."""
+        """Return the step after the first interruption, or `end` if there is none."""
         first = self.next_step
         steps = end - first
         block = bodies.block(first, end)

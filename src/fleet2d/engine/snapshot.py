@@ -322,7 +322,7 @@ class _StateReader(pickle.Unpickler):
         return self._constants[pid]
 
     def find_class(self, module: str, name: str) -> Any:
-        if not is_scenario_module(module):  # it may be one under another name in this process
+        if not is_scenario_module(module):  # this process may know it by another name
             top, dot, rest = public_name(module).partition(".")
             module = self._packages.get(top, top) + dot + rest
         return super().find_class(module, name)

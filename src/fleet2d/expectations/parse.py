@@ -234,7 +234,7 @@ class Expected(NamedTuple):
     covers: tuple[str, ...] = ()
 
     def content(self) -> Any:
-        """Return it as a scenario file has it: text, or a mapping if it covers requirements."""
+        """Return the entry of a scenario file: text, or a mapping if it covers requirements."""
         text = str(self.that)
         return {"that": text, "covers": list(self.covers)} if self.covers else text
 

@@ -284,7 +284,7 @@ class PortalEntry(FileModel):
     type: Literal["stairs", "lift"] = "stairs"
 
     def to_portal(self, scale: float) -> Portal:
-        """Return it as a part of a plan, with its places multiplied by `scale`."""
+        """Return the portal as a part of a plan, with its places multiplied by `scale`."""
         (x0, y0), (x1, y1) = self.start, self.end
         start, end = (x0 * scale, y0 * scale), (x1 * scale, y1 * scale)
         return Portal(self.type, start, end, round(self.takes * 1_000_000))

@@ -183,7 +183,7 @@ class PortalSettings(Settings):
     type: Literal["stairs", "lift"] = "stairs"
 
     def to_portal(self) -> Portal:
-        """Return it as a part of a plan."""
+        """Return the portal as a part of a plan."""
         return Portal(self.type, *self.ends, self.takes // timedelta(microseconds=1))
 
 

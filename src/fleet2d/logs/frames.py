@@ -154,7 +154,7 @@ class FrameTree:
     """
 
     def __init__(self, reader: Any, path: Path) -> None:
-        """Take an open bag."""
+        """Wrap an open bag; its transforms are read at first use."""
         self._reader = reader
         self.path = path
         self.notes = list[str]()

@@ -301,7 +301,7 @@ class LocalTime(datetime):
         return other if other.tzinfo is not self.tzinfo else self.zone.at(written(other))
 
     def astimezone(self, tz: tzinfo | None = None) -> datetime:  # type: ignore[override]
-        """Return it as a datetime of the standard library in another time zone."""
+        """Return this time as a standard `datetime` in another time zone."""
         return (EPOCH.replace(tzinfo=UTC) + timedelta(microseconds=self.utc_us)).astimezone(tz)
 
     def timestamp(self) -> float:

@@ -461,7 +461,7 @@ class Comparison:
 
     @property
     def p(self) -> float:
-        """The p value of the mean; of too few units that of the exact sign test."""
+        """The p value of the mean, or of the exact sign test if there are too few units."""
         return self.estimate.sign_p if self.estimate.doubt else self.estimate.p_value
 
     @property

@@ -137,7 +137,7 @@ def map_runs(
 
 @contextmanager
 def open_crew(executor: ExecutorName | Executor, workers: int | None = None) -> Iterator[Crew]:
-    """Yield a crew of an executor by its name, which ends with the context; or of your own.
+    """Yield a crew for an executor; one given by name is closed at the end of the context.
 
     Args:
         executor: The name; or an executor, which stays open.

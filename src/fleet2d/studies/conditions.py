@@ -17,7 +17,7 @@ class Range(NamedTuple):
     high: float
 
     def __str__(self) -> str:
-        """Return it as conditions write it."""
+        """Return the range as conditions write it."""
         low, high = (f"{end:g}" if math.isfinite(end) else "" for end in self)
         return f"{low}..{high}"
 

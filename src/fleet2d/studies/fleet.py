@@ -154,7 +154,7 @@ class GroupCondition:
     is_met: bool = True
 
     def __str__(self) -> str:
-        """Return it in words."""
+        """Return the condition in words."""
         if self.is_number:
             return f"{self.feature} {'≤' if self.is_met else '>'} {number(float(self.value))}"
         return f"{self.feature} {'is' if self.is_met else 'is not'} {self.value}"

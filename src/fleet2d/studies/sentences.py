@@ -52,7 +52,7 @@ class Conclusion:
         return {"question": self.question, "sentences": list(self.sentences), "table": rows}
 
     def __str__(self) -> str:
-        """Return it as lines of text."""
+        """Return the conclusion as lines of text."""
         lines = [self.question] if self.question else []
         lines += self.sentences
         if self.table:
@@ -67,7 +67,7 @@ class Conclusion:
         return [f"… and {counted(more, 'more row')}"] if more > 0 else []
 
     def _repr_html_(self) -> str:
-        """Return it for notebooks and pages."""
+        """Return the conclusion as HTML, for notebooks and pages."""
         parts = [f"<h3>{html.escape(self.question)}</h3>"] if self.question else []
         parts += [f"<p>{html.escape(' '.join(self.sentences))}</p>"]
         if self.table:

@@ -114,7 +114,7 @@ class Tally:
         return nested_rate_interval(list(by_home.values())) if by_home else (0.0, 1.0)
 
     def content(self) -> dict[str, Any]:
-        """Return it as plain JSON data."""
+        """Return the tally as plain JSON data."""
         return {
             "test": self.test,
             "expectation": self.name,
@@ -254,7 +254,7 @@ class PairedChange(NamedTuple):
         return bool(self.worse or self.better)
 
     def content(self) -> dict[str, Any]:
-        """Return it as plain JSON data."""
+        """Return the change as plain JSON data."""
         worse = [key.label for key in self.worse]
         better = [key.label for key in self.better]
         return {**self._asdict(), "worse": worse, "better": better}
@@ -393,7 +393,7 @@ class RequirementCoverage(NamedTuple):
         return min(self.verdicts.values(), key=RANKING.index, default=NOT_COVERED)
 
     def content(self) -> dict[str, Any]:
-        """Return it as plain JSON data."""
+        """Return the coverage as plain JSON data."""
         return {
             "requirement": self.requirement,
             "text": self.text,
@@ -523,7 +523,7 @@ class Gate:
             yield f"{self.known_as}: {each.sentence()}"
 
     def content(self) -> dict[str, Any]:
-        """Return it as plain JSON data."""
+        """Return the gate as plain JSON data."""
         return {
             "passes": self.passes,
             "build": self.build,

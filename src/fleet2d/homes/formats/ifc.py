@@ -129,11 +129,11 @@ def _storey_of(element: Any, heights: Mapping[str, float]) -> str | None:
 
 
 def _features(model: Any, heights: Mapping[str, float], notes: list[str]) -> Iterator[Feature]:
-    """Yield what is on each storey as features [m]; what hangs on walls is left out."""
+    """Yield the elements of each storey as features [m], without those that hang on walls."""
     lost = 0
     for kind, element in _elements(model):
         if kind == "opening" and element.HasFillings:
-            continue  # a door or window is in it
+            continue  # the door or window in it is an element itself
         points, faces = _geometry(element)
         shape = _seen_from_above(points, faces)
         lost += shape.is_empty

@@ -161,7 +161,7 @@ def rtp_scores(belief: F64, truth: I64, gap: F64) -> dict[str, float]:
 
 
 def by_gap(gap: F64) -> Iterator[tuple[str, Bool]]:
-    """Yield each class of gaps that there are, and which windows are in it.
+    """Yield each class of gaps that occurs, with a mask of its windows.
 
     Example:
         >>> [(name, own.tolist()) for name, own in by_gap(np.array([3.0, 300.0]))]

@@ -45,7 +45,7 @@ class ForecastMoments(NamedTuple):
         return ForecastMoments(*(column[chosen] for column in self))
 
     def weighted(self, weight: float) -> "ForecastMoments":
-        """Return them with another weight."""
+        """Return the same moments with another weight."""
         return self._replace(weight=np.full(len(self.outcome), weight))
 
 

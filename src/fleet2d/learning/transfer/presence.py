@@ -31,7 +31,7 @@ def thinned(parts: Sequence[Windows], rows: int) -> list[Windows]:
 
 
 def presence_forecast(sources: Sources, cell: Cell) -> Forecast:
-    """Train the network of a cell, and score it on the days of its home that are tested on."""
+    """Train the network of a cell, and score it on the test days of its home."""
     rows = sources.file.rows
     own_log = f"log-{cell.home}"
     log = sources.windows_of(own_log)

@@ -157,7 +157,7 @@ class Sources:
         }
 
     def _derived(self, kind: str, name: str, home: HomeEntry, days: int) -> dict[str, Any]:
-        """Write a persona, or a log, that is made of the own days of a home; return its user."""
+        """Write a persona or a log derived from a home's own days; return its user."""
         if kind == "fitted":
             path = self.folder / f"{name}.yaml"
             write_atomically(path, to_yaml(home.fitted(days).document).encode())

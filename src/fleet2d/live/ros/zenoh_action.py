@@ -18,19 +18,19 @@ Reply = Callable[[Fields], None]
 
 
 class _AcceptedGoal(ActionGoal):
-    """A goal, with its result and with who waits for that."""
+    """A goal, with its result and the clients that wait for it."""
 
     result: Fields = MappingProxyType({})
     waiting: tuple[Reply, ...] = ()
 
     @property
     def info(self) -> Fields:
-        """It as action_msgs/msg/GoalInfo."""
+        """The fields of its action_msgs/msg/GoalInfo."""
         return {"goal_id": {"uuid": _uuid(self.id)}, "stamp": self.stamp}
 
     @property
     def response(self) -> Fields:
-        """What a client hears who asks for the result."""
+        """The reply to a client that asks for the result."""
         return {"status": int(self.status), "result": self.result}
 
 
@@ -122,7 +122,7 @@ class ZenohAction:
         reply({} if goal is None else goal.response)  # the state 0 is "unknown"
 
     def cancel(self, request: dict[str, Any], reply: Reply) -> None:
-        """Serve `cancel_goal`: of a goal, of all up to a time, or of all, as rcl_action does."""
+        """Serve `cancel_goal` as rcl_action does: for one goal, all up to a time, or all."""
         info = request["goal_info"]
         name = bytes(info["goal_id"]["uuid"]).hex()
         until = _time(info["stamp"])
@@ -154,5 +154,5 @@ def _uuid(name: str) -> Any:
 
 
 def _time(stamp: Fields) -> int:
-    """Return a time of ROS [ns]."""
+    """Return the time of a ROS stamp [ns]."""
     return int(stamp["sec"]) * 10**9 + int(stamp["nanosec"])
