@@ -275,7 +275,7 @@ def _row(gate: Gate, each: Tally) -> dict[str, Any]:
     if untested:
         row["held"] += f", {untested} untested"
     row["95 % interval"] = f"{percent(low)} to {percent(high)}" if each.outcomes else "–"
-    row["margin"] = least_margin(each) or "–"
+    row["margin"] = "–" if each.least_margin is None else margin_text(*each.least_margin)
     row["worst in"] = each.failed[0].label if each.failed else "–"
     if gate.against:
         change = gate.change_of.get(each.place)
@@ -286,9 +286,3 @@ def _row(gate: Gate, each: Tally) -> dict[str, Any]:
             difference = ", ".join(parts) or "same"
         row[f"than {gate.against}"] = difference
     return row
-
-
-def least_margin(each: Tally) -> str:
-    """Return the lowest margin of an expectation as text; empty if it has none."""
-    margins = [(o.margin, o.unit) for o in each.outcomes.values() if o.margin is not None]
-    return margin_text(*min(margins)) if margins else ""

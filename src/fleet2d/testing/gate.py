@@ -106,6 +106,12 @@ class Tally:
         return sum(outcome.holds is True for outcome in self.outcomes.values())
 
     @property
+    def least_margin(self) -> tuple[float, str] | None:
+        """Its lowest margin and the unit of that; None without any."""
+        outcomes = self.outcomes.values()
+        return min(((o.margin, o.unit) for o in outcomes if o.margin is not None), default=None)
+
+    @property
     def rate(self) -> tuple[float, float]:
         """The 95 % interval of the share of trials in which it doesn't fail; (0, 1) without any."""
         by_home: dict[str, list[bool]] = {}

@@ -81,10 +81,9 @@ def _numbers(gate: Gate, each: Tally) -> dict[str, object]:
         "rate_high": round(high, 4),
         "covers": ", ".join(sorted(each.covers)),
     }
-    margins = [(o.margin, o.unit) for o in each.outcomes.values() if o.margin is not None]
-    if margins:
-        numbers["least_margin"], numbers["unit"] = min(margins)
-    change = gate.change_of.get((each.test, each.name))
+    if each.least_margin is not None:
+        numbers["least_margin"], numbers["unit"] = each.least_margin
+    change = gate.change_of.get(each.place)
     if change is not None:
         numbers |= {"worse": len(change.worse), "better": len(change.better)}
         numbers |= {"p": round(change.p, 6), "p_holm": round(change.p_holm, 6)}

@@ -225,7 +225,7 @@ class TryJob:
         except Exception as error:  # noqa: BLE001 - some points give no valid home; reported
             return None, "", "", describe_error(error)
         failure = result.first_failure
-        what = " ".join(filter(None, [failure.name, failure.kind])) if failure else ""
+        what = f"{failure.name} {failure.kind}".strip() if failure else ""
         return result.margin, result.amount, what, None
 
 
@@ -311,8 +311,9 @@ class FailureSearch(TaskQueue):
         for name in self._job.space.ranges:
             bad = [point[name] for point in failing]
             good = sorted(point[name] for point in self.points)
-            sides = [v for v in good if v < min(bad)], [v for v in good if v > max(bad)]
-            parts = [_stretch(values) for values in sides if values]
+            below = [value for value in good if value < min(bad)]
+            above = [value for value in good if value > max(bad)]
+            parts = [_stretch(values) for values in (below, above) if values]
             if parts:
                 lines.append(f"{name}: {', '.join(parts)}")
         for name, choices in self._job.space.choices.items():

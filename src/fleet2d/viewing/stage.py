@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import matplotlib.dates as mdates
@@ -10,7 +11,6 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection, PolyCollection
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
@@ -48,6 +48,9 @@ from fleet2d.viewing.pictures.life import (
 from fleet2d.viewing.postures import Postures
 from fleet2d.viewing.run_facts import bodies_of, sightings_of
 
+Corners = list[tuple[float, float]]
+
+AWAY_COLOR = "#f1f2f4"
 SEEN_PART = 0.22  # height of the marks of sightings at the foot of a row, as a share of it
 ROW_PART = 0.86
 MAX_SAMPLES = 100_000
@@ -71,22 +74,26 @@ def draw_strip(run: Run, plan: FloorPlan, bodies: Sequence[BodyFacts], axes: Axe
     clock = run.clock
     interval = timedelta(microseconds=clock.step_us * -(-clock.steps // MAX_SAMPLES))
     begin, end = mdates.date2num(clock.stamps(np.array([0, clock.steps]))).tolist()
-    boxes: list[F64] = []
-    faces: list[tuple[float, float, float]] = []
+    boxes: list[Corners] = []
+    colors: list[str] = []
     labels = room_labels(plan.rooms)
     for number, body in enumerate(bodies):
-        for start, stop, room in _stretches(run.path(body["name"], interval), clock, end):
-            low = number
-            high = number + ROW_PART
-            boxes.append(np.array([[start, low], [stop, low], [stop, high], [start, high]]))
-            faces.append(to_rgb(deep_color(plan.rooms[room].type) if room >= 0 else "#f1f2f4"))
+        path = run.path(body["name"], interval)
+        for start, stop, room in _stretches(path, clock, end):
+            boxes.append(_corners(start, number, stop, number + ROW_PART))
+            colors.append(deep_color(plan.rooms[room].type) if room >= 0 else AWAY_COLOR)
             if room >= 0 and stop - start > LABEL_PART * (end - begin):
                 style = {**CENTERED, "color": TEXT_COLOR, "fontsize": 6.5, "clip_on": True}
                 axes.text((start + stop) / 2, number + 0.42, labels[room], **style)
-    axes.add_collection(PolyCollection(boxes, facecolors=faces, lw=0, zorder=1), autolim=False)
+    rows = PolyCollection(boxes, facecolors=colors, lw=0, zorder=1)
+    axes.add_collection(rows, autolim=False)
     _mark_sightings(run, [body["name"] for body in bodies], axes)
     axes.set(xlim=(begin, end), ylim=(len(bodies), -0.05))
     _label(axes, bodies, clock)
+
+
+def _corners(left: float, low: float, right: float, high: float) -> Corners:
+    return [(left, low), (right, low), (right, high), (left, high)]
 
 
 def _stretches(path: Trajectory, clock: Clock, end: float) -> list[tuple[float, float, int]]:
@@ -109,9 +116,9 @@ def _mark_sightings(run: Run, names: Sequence[str], axes: Axes) -> None:
         begins = mdates.date2num(start + np.array(lane["first"]) * step)
         ends = mdates.date2num(start + (np.array(lane["last"]) + 1) * step)
         for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
-            head = foot - SEEN_PART
-            boxes.append([(begin, head), (end, head), (end, foot), (begin, foot)])
-    axes.add_collection(PolyCollection(boxes, facecolors=TEXT_COLOR, lw=0, zorder=2), autolim=False)
+            boxes.append(_corners(begin, foot - SEEN_PART, end, foot))
+    marks = PolyCollection(boxes, facecolors=TEXT_COLOR, lw=0, zorder=2)
+    axes.add_collection(marks, autolim=False)
 
 
 def _label(axes: Axes, bodies: Sequence[BodyFacts], clock: Clock) -> None:
@@ -191,7 +198,8 @@ def asked_of(run: Run) -> list[AskedTime]:
     asked: list[AskedTime] = []
     open_ones: dict[str, AskedTime] = {}  # by robot
     columns = (events[name].to_pylist() for name in ("step", "entity", "event", "detail"))
-    for step, robot, event, detail in sorted(zip(*columns, strict=True), key=lambda row: row[0]):
+    rows = sorted(zip(*columns, strict=True), key=itemgetter(0))
+    for step, robot, event, detail in rows:
         if event in ENDS_TALK and robot in open_ones:
             asked.append(open_ones.pop(robot)._replace(end=step))
         elif event == EventKind.ASKS:
@@ -399,12 +407,13 @@ class Stage:
     def _name(self, body: BodyArtists, step: int) -> str:
         """Write what a robot asks, and what is answered, beside its name; return the text."""
         name = body.facts["name"]
-        text = body_label(name)
+        label = body_label(name)
+        text = label
         for talk in self._talks:
             if talk.robot == name and talk.step <= step <= self._end_of(talk):
                 is_answered = talk.answered is not None and talk.answered <= step
                 answer = f", {talk.answer}" if is_answered else "?"
-                text = f"{body_label(name)}: {talk.text}{answer}"
+                text = f"{label}: {talk.text}{answer}"
         body.name.set_text(text)
         return text
 
@@ -473,9 +482,11 @@ class Stage:
         place = np.array([pose for _, pose in here]).reshape(-1, 1, 3)
         facing = directions(place[..., 2])
         centre = place[..., :2]
-        self._noses.set(segments=np.append(centre, centre + NOSE * radius * facing, axis=1))
+        tips = centre + NOSE * radius * facing
+        self._noses.set(segments=np.append(centre, tips, axis=1))
         self._noses.set_color(colors)
-        stretch = np.array([LYING if body.lies else 1.0 for body, _ in here]).reshape(-1, 1, 1)
+        lengths = [LYING if body.lies else 1.0 for body, _ in here]
+        stretch = np.array(lengths).reshape(-1, 1, 1)
         beside = np.stack([-facing[..., 1], facing[..., 0]], axis=2)
         around = CIRCLE[:, :1] * stretch * facing + CIRCLE[:, 1:] * beside
         self._discs.set(verts=centre + radius * around, facecolor=colors)
@@ -520,7 +531,8 @@ class Stage:
         colors = []
         for body in self.bodies:
             path = body.path
-            xy = np.stack([path.x[span], path.y[span]], axis=1)[~path.away[span]]
+            every = np.stack([path.x[span], path.y[span]], axis=1)
+            xy = every[~path.away[span]]
             if len(xy) > 1 and (xy != xy[0]).any():
                 lines.append(xy)
                 colors.append(body.facts["color"])

@@ -335,7 +335,9 @@ def _next_rooms(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
 def _activities(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
     """Yield for each label at home the kind of room and the hour, and the activity."""
     rows = zip(labels["kind"], _hours(labels["time"]), labels["activity"], strict=True)
-    yield from (((kind, hour), what) for kind, hour, what in rows if kind != AWAY and what)
+    for kind, hour, activity in rows:
+        if kind != AWAY and activity:
+            yield (kind, hour), activity
 
 
 def _hours(times: Any) -> I64:
@@ -353,7 +355,8 @@ def _returns(data: Dataset, split: str) -> tuple[I64, F64]:
             continue
         until = labels["next_step"].astype(float) - step
         own = (labels["kind"] == AWAY) & ~np.isnan(until)
-        step_s = (time[1] - time[0]) / np.timedelta64(1, "s") / max(int(step[1] - step[0]), 1)
+        passed_s = (time[1] - time[0]) / np.timedelta64(1, "s")
+        step_s = passed_s / max(int(step[1] - step[0]), 1)
         hours.append(_hours(time[own]))
         minutes.append(until[own] * step_s / 60)
     return np.concatenate(hours), np.concatenate(minutes)
@@ -365,7 +368,9 @@ def _score_time_to_return(data: Dataset, split: str, _: object) -> Scores:
     if not len(known) or not len(truth):
         return {}
     overall = float(np.median(known))
-    by_hour = [np.median(known[hour == h]) if (hour == h).any() else overall for h in range(24)]
+    by_hour = np.full(24, overall)
+    for each in np.unique(hour):
+        by_hour[each] = np.median(known[hour == each])
     guesses = {"median": np.full(len(truth), overall), "median by hour": np.take(by_hour, asked)}
     return {
         name: ({"mae_min": float(np.abs(guess - truth).mean())}, len(truth))

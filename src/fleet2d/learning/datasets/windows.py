@@ -178,8 +178,9 @@ class _Dense:
 
     def of(self, user: str) -> TracedEvidence:
         """Return the evidence of a user, with a belief that is filled in later."""
-        seen = self.seen.get(user, np.zeros(self.watched.shape)) / self.bin_steps
-        belief = np.ones((len(self.step), self.watched.shape[1] + 1))
+        bins, rooms = self.watched.shape
+        seen = self.seen.get(user, np.zeros((bins, rooms))) / self.bin_steps
+        belief = np.ones((bins, rooms + 1))
         return TracedEvidence(self.day, self.minute, self.watched, seen, self.unknown, belief)
 
     def windows(self, number: int, home: str, of_run: tuple[str, ...], user: str) -> Windows:
@@ -202,7 +203,8 @@ class _Dense:
                 kept = at[truth[at] >= 0]
             stored[model] = belief[np.isin(at, kept)]
         assert kept is not None, "there are beliefs"
-        features = trace_evidence(np.zeros(trace_size(rooms)), rooms, self.of(user))[kept]
+        traced = trace_evidence(np.zeros(trace_size(rooms)), rooms, self.of(user))
+        features = traced[kept]
         features[..., -1] = natural_log(np.maximum(stored[PRIOR], MIN_BELIEF))
         return Windows(
             number,

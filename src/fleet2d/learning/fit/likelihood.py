@@ -9,6 +9,7 @@ assume normal distributions, and they are open where the log bounds a parameter 
 import math
 from collections.abc import Sequence
 from functools import cache
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -102,10 +103,8 @@ class ProductLikelihood:
         for factor in self.factors:
             starts = [[*values, *start] for values in starts for start in factor.starts]
         free = np.ones(len(self.lower), bool)
-        return max(
-            (self._climb(np.array(start, np.float64), free) for start in starts),
-            key=lambda fit: fit.log_likelihood,
-        )
+        fits = [self._climb(np.array(start, np.float64), free) for start in starts]
+        return max(fits, key=attrgetter("log_likelihood"))
 
     def estimates(self, best: Fit) -> dict[str, ParameterEstimate]:
         """Return every parameter with its interval, by name."""
@@ -114,10 +113,9 @@ class ProductLikelihood:
         for factor in self.factors:
             for i, name in enumerate(factor.names):
                 ends = [self._interval_end(best, index, side) for side in (-1, 1)]
-                estimates[name] = ParameterEstimate(
-                    factor.natural(i, float(best.theta[index])),
-                    *(None if end is None else factor.natural(i, end) for end in ends),
-                )
+                low, high = [None if end is None else factor.natural(i, end) for end in ends]
+                value = factor.natural(i, float(best.theta[index]))
+                estimates[name] = ParameterEstimate(value, low, high)
                 index += 1
         return estimates
 
@@ -133,9 +131,8 @@ class ProductLikelihood:
             shares = shares * share
             slopes.append(slope / share[:, None])
             index += count
-        return np.clip(shares, PROBABILITY_MARGIN, 1 - PROBABILITY_MARGIN), np.concatenate(
-            slopes, axis=1
-        )
+        shares = np.clip(shares, PROBABILITY_MARGIN, 1 - PROBABILITY_MARGIN)
+        return shares, np.concatenate(slopes, axis=1)
 
     def _value(self, shares: F64) -> float:
         """Return the log-likelihood of the probabilities of the rows."""
@@ -286,7 +283,8 @@ class Orientation(Factor):
         """Return the factor of each row, and its derivatives by the two logits."""
         side = share_of(float(theta[0]))
         back = share_of(float(theta[1]))
-        share = (1 - self._side - self._back) + side * self._side + back * self._back
+        front = 1 - self._side - self._back
+        share = front + side * self._side + back * self._back
         slopes = [
             self._side * max(side * (1 - side), 1e-9),
             self._back * max(back * (1 - back), 1e-9),

@@ -306,21 +306,19 @@ def fit_probability(
             del factors[name]
             best = reduced
     likelihood = ProductLikelihood([top, *factors.values()], outcomes)
-    return FittedProbability(
-        likelihood.estimates(best), best, omitted, group_rows(best.shares, outcomes)
-    )
+    groups = group_rows(best.shares, outcomes)
+    return FittedProbability(likelihood.estimates(best), best, omitted, groups)
 
 
 def group_rows(shares: F64, outcomes: Bool) -> list[ProbabilityGroup]:
     """Return groups of equal size of the rows, sorted by their predicted probability."""
     parts: Sequence[I64] = np.array_split(np.argsort(shares, kind="stable"), GROUPS)
-    return [
-        ProbabilityGroup(
-            len(part), float(shares[part].mean()), wilson(int(outcomes[part].sum()), len(part))
-        )
-        for part in parts
-        if len(part)
-    ]
+    groups = []
+    for part in parts:
+        if len(part):
+            observed = wilson(int(outcomes[part].sum()), len(part))
+            groups.append(ProbabilityGroup(len(part), float(shares[part].mean()), observed))
+    return groups
 
 
 def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
@@ -337,9 +335,8 @@ def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
         )
         return None
     distance = log.distance[log.detected]
-    fitted = fit_probability(
-        right, Constant("top", len(right)), {"distance": Falling("distance", distance)}
-    )
+    factors: dict[str, Factor] = {"distance": Falling("distance", distance)}
+    fitted = fit_probability(right, Constant("top", len(right)), factors)
     wrong = ~right
     mistaken = wrong & (perceived != "")
     confusion: dict[str, dict[str, float]] = {}
@@ -371,8 +368,8 @@ def _at(estimates: dict[str, ParameterEstimate], distance: float) -> float:
         return top
     midpoint = estimates["distance midpoint"].value
     width = estimates["distance width"].value
-    share: float = top / (1 + np.exp(np.clip((distance - midpoint) / width, -700, 700)))
-    return float(share)
+    scaled = np.clip((distance - midpoint) / width, -700, 700)
+    return float(top / (1 + np.exp(scaled)))
 
 
 def _curve(estimates: dict[str, ParameterEstimate], name: str, top: float | None = None) -> Any:

@@ -54,7 +54,8 @@ def _persona_figure(
     upper: Any
     lower: Any
     upper, lower = figure.subfigures(2, 1)  # type: ignore[misc]
-    for axes, labels, label in zip(upper.subplots(1, 3, sharey=True), sets, LABELS, strict=True):
+    panels = upper.subplots(1, 3, sharey=True)
+    for axes, labels, label in zip(panels, sets, LABELS, strict=True):
         stacked = np.cumsum(by_hour(labels, count), axis=1)
         below = np.zeros(24)
         for above, place in zip(stacked.T, timeline.places, strict=True):

@@ -99,17 +99,17 @@ def export_home_assistant(run: Run, path: Path, part: Selection) -> str:
         entity = number[state.entity]
         rows.append((count, state.state, at, last.get(state.entity), entity, entity))
         last[state.entity] = count
-    first, end = (_utc(clock, step) for step in (part.first, part.end))
+    first = _utc(clock, part.first)
+    end = _utc(clock, part.end)
+    names = [(row, name) for name, row in number.items()]
+    attributes = [(number[name], json.dumps(each)) for name, each in entities.items()]
     with closing(sqlite3.connect(":memory:")) as database:
         database.executescript(TABLES)
         database.execute("INSERT INTO schema_changes VALUES (1, ?, ?)", (SCHEMA, first))
         database.execute("INSERT INTO recorder_runs VALUES (1, ?, ?, 0, ?)", (first, end, first))
+        database.executemany("INSERT INTO states_meta VALUES (?, ?)", names)
         database.executemany(
-            "INSERT INTO states_meta VALUES (?, ?)", [(row, name) for name, row in number.items()]
-        )
-        database.executemany(
-            "INSERT INTO state_attributes (attributes_id, shared_attrs) VALUES (?, ?)",
-            [(number[name], json.dumps(attributes)) for name, attributes in entities.items()],
+            "INSERT INTO state_attributes (attributes_id, shared_attrs) VALUES (?, ?)", attributes
         )
         database.executemany(
             "INSERT INTO states (state_id, state, last_updated_ts, old_state_id, attributes_id,"
@@ -189,11 +189,12 @@ def _states(run: Run, part: Selection) -> Iterator[_EntityState]:
         for row in chunk.rows.get("sensors", ()):
             on, _ = sensors[row["sensor"]].words
             entity = entity_name("binary_sensor", row["sensor"])
-            states.append(_EntityState(row["step"], entity, "on" if row["state"] == on else "off"))
-        for state in sorted(states, key=attrgetter("step")):
-            if now.get(state.entity) != state.state:
-                now[state.entity] = state.state
-                yield state
+            state = "on" if row["state"] == on else "off"
+            states.append(_EntityState(row["step"], entity, state))
+        for each in sorted(states, key=attrgetter("step")):
+            if now.get(each.entity) != each.state:
+                now[each.entity] = each.state
+                yield each
 
 
 def _rooms(way: Trajectory, rooms: list[str]) -> Iterator[tuple[int, str]]:

@@ -106,8 +106,9 @@ def _poses(chunk: Chunk, rooms: list[str], clock: Clock) -> Iterator[dict[str, A
         for i, (step, away) in enumerate(zip(way.step.tolist(), way.away.tolist(), strict=True)):
             row = {"step": step, "time": times[i], "record": "pose", "entity": name}
             if not away:
-                row |= {"x": float(way.x[i]), "y": float(way.y[i])}
-                row |= {"heading": float(way.heading[i])}
+                row["x"] = float(way.x[i])
+                row["y"] = float(way.y[i])
+                row["heading"] = float(way.heading[i])
                 if way.room[i] >= 0:
                     row["room"] = rooms[way.room[i]]
             yield row | {"away": away}

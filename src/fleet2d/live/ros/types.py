@@ -199,9 +199,8 @@ class RosTypes:
         ]
         self._add(f"{name}_Event", event)
         kinds = ("Request", "Response", "Event")
-        self._add(
-            name, [(f"{kind.lower()}_message", self._named(f"{name}_{kind}")) for kind in kinds]
-        )
+        messages = [(f"{kind.lower()}_message", self._named(f"{name}_{kind}")) for kind in kinds]
+        self._add(name, messages)
 
     def _add_action(self, name: str, definition: str) -> None:
         for kind, part in zip(("Goal", "Result", "Feedback"), _parts(definition), strict=True):
@@ -210,9 +209,9 @@ class RosTypes:
         stamp = "stamp", self._named("builtin_interfaces/msg/Time")
         accepted = "accepted", self._base("bool")
         status = "status", self._base("int8")
-        goal, result, feedback = (
-            (kind.lower(), self._named(f"{name}_{kind}")) for kind in ("Goal", "Result", "Feedback")
-        )
+        goal = "goal", self._named(f"{name}_Goal")
+        result = "result", self._named(f"{name}_Result")
+        feedback = "feedback", self._named(f"{name}_Feedback")
         self._add(f"{name}_SendGoal_Request", [goal_id, goal])
         self._add(f"{name}_SendGoal_Response", [accepted, stamp])
         self._add(f"{name}_GetResult_Request", [goal_id])

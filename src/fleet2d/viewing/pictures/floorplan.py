@@ -399,11 +399,11 @@ def floorplan_axes(plan: FloorPlan, axes: Axes, *, names: bool = True, title: bo
         label_objects(plan, axes)
     if title:
         rooms = counted(len(plan.rooms), "room")
-        height = 0.65 * _margin(plan)
         left, _, _, top = plan.bounds
+        at = (left - WALL_M, top + 0.65 * _margin(plan))
         style: dict[str, Any] = {"va": "center", "color": TEXT_COLOR, "zorder": 5}
         text = f"{short_name(plan.name)}\n{plan.area_m2:,.1f} m² · {rooms}"
-        axes.text(left - WALL_M, top + height, text, fontsize=11, linespacing=1.4, **style)
+        axes.text(*at, text, fontsize=11, linespacing=1.4, **style)
 
 
 def short_name(name: str) -> str:
@@ -680,13 +680,14 @@ def draw_checkup(plan: FloorPlan, findings: Sequence[Finding], path: Path) -> No
     width, height = figure_size(plan)
     lines = _lines(findings, int(width * LETTERS_PER_IN))
     below = LINE_IN * (len(lines) + 2)
-    with picture(path, width, height + below) as figure:
-        axes = figure.add_axes((0, below / (height + below), 1, height / (height + below)))
+    whole = height + below
+    with picture(path, width, whole) as figure:
+        axes = figure.add_axes((0, below / whole, 1, height / whole))
         floorplan_axes(plan, axes)
         for number, finding in enumerate(findings, start=1):
             _mark(axes, number, finding)
         for row, (text, color) in enumerate(lines):
-            y = (below - LINE_IN * (row + 1)) / (height + below)
+            y = (below - LINE_IN * (row + 1)) / whole
             figure.text(0.03, y, text, fontsize=8, color=color, va="center")
 
 

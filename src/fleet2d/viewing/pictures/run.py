@@ -147,10 +147,10 @@ def draw_actogram(
     table = np.ones((len(plan.rooms) + 2, 4))
     table[:-2, :3] = [to_rgb(deep_color(room.type)) for room in plan.rooms]
     table[-1, 3] = 0.0  # away: transparent over the hatching
-    style: dict[str, Any] = {"facecolor": "white", "edgecolor": HATCH_COLOR, "hatch": "//////"}
-    axes.add_patch(Rectangle((0, 0), 24, days, lw=0, **style))
-    extent = (0, 24, days, 0)
-    axes.imshow(table[rooms], extent=extent, aspect="auto", interpolation="nearest", zorder=1)
+    hatching: dict[str, Any] = {"facecolor": "white", "edgecolor": HATCH_COLOR, "hatch": "//////"}
+    axes.add_patch(Rectangle((0, 0), 24, days, lw=0, **hatching))
+    style: dict[str, Any] = {"aspect": "auto", "interpolation": "nearest", "zorder": 1}
+    axes.imshow(table[rooms], extent=(0, 24, days, 0), **style)
     gap = 1.1 if days <= 40 else 0.6  # points
     if days > GAPS_UP_TO:
         gap = 0.0
@@ -387,10 +387,12 @@ class _Picture:
         top = self.height
         name = scenario.get("name") or "run"
         duration = _length(self.steps * self.step_us)
-        x = self.overlay.write(EDGE, top - 0.42, self.overlay.fit(name, 16, 4.0), 16, weight="bold")
+        overlay = self.overlay
+        title = overlay.fit(name, 16, 4.0)
+        x = overlay.write(EDGE, top - 0.42, title, 16, weight="bold")
         subtitle = f"{duration} in {short_name(self.plan.name)}"
-        subtitle = self.overlay.fit(subtitle, 16, self.width - EDGE - x - 0.15)
-        self.overlay.write(x + 0.12, top - 0.42, subtitle, 16, color=QUIET_COLOR)
+        subtitle = overlay.fit(subtitle, 16, self.width - EDGE - x - 0.15)
+        overlay.write(x + 0.12, top - 0.42, subtitle, 16, color=QUIET_COLOR)
         end = self.start + timedelta(microseconds=self.steps * self.step_us)
         digest = self.run.digest
         facts = [
@@ -399,10 +401,11 @@ class _Picture:
             f"seed {self.run.manifest['seed']}",
             f"digest {digest[:12]}" if digest else "no digest",
         ]
-        x = self.overlay.write(EDGE, top - 0.66, WIDE_SEPARATOR.join(facts), 8.5, color=QUIET_COLOR)
+        line = WIDE_SEPARATOR.join(facts)
+        x = overlay.write(EDGE, top - 0.66, line, 8.5, color=QUIET_COLOR)
         if self.run.status != "complete":
             style = {"color": ACCENT_COLOR, "weight": "bold"}
-            self.overlay.write(x + 0.2, top - 0.66, self.run.status, 8.5, **style)
+            overlay.write(x + 0.2, top - 0.66, self.run.status, 8.5, **style)
 
     def _life(self) -> None:
         axes = self._axes(EDGE, self.foot, self.left, self.body)
