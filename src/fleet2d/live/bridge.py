@@ -97,12 +97,11 @@ class LiveStep:
     def messages(self) -> list[dict[str, Any]]:
         """The frame as JSON objects: one of poses, one for each event and row."""
         stamp = {"step": self.step, "time": self.time.isoformat()}
-        return [
-            {"type": "poses", **stamp, "bodies": self.bodies},
-            *({"type": "event", **e._asdict(), "event": str(e.event)} for e in self.events),
-            *({"type": "row", "table": table, "row": row} for table, row in self.rows),
-            *(stamp | goal.message() for goal in self.goals),
-        ]
+        poses = {"type": "poses", **stamp, "bodies": self.bodies}
+        events = [{"type": "event", **e._asdict(), "event": str(e.event)} for e in self.events]
+        rows = [{"type": "row", "table": table, "row": row} for table, row in self.rows]
+        goals = [stamp | goal.message() for goal in self.goals]
+        return [poses, *events, *rows, *goals]
 
     @cached_property
     def texts(self) -> list[str]:
@@ -551,9 +550,8 @@ class Bridge:
         if before != sender and is_recent:
             self._tell_two_senders(name)
         if off > JUMP_M + JUMP_M_PER_S * passed_s:
-            self._count(
-                "jumps", f"{name}: a pose is {off:.1f} m from the one {passed_s:g} s before"
-            )
+            jump = f"a pose is {off:.1f} m from the one {passed_s:g} s before"
+            self._count("jumps", f"{name}: {jump}")
 
     def _tell_two_senders(self, name: str) -> None:
         self._count("of two senders", f"{name}: poses of two programs arrive: name its source")
@@ -612,9 +610,12 @@ class Bridge:
             if robot is None or robot.perceives is None or robot.perceives.relative:
                 return message
             free = self.simulation.home.plan.free_space
-            places = [shapely.Point(d.x, d.y) for d in message.detections]
-            far = [float(free.distance(place)) for place in places]
-            inside = [d for d, m in zip(message.detections, far, strict=True) if m <= REACH_M]
+            inside = []
+            far = []
+            for each in message.detections:
+                far.append(float(free.distance(shapely.Point(each.x, each.y))))
+                if far[-1] <= REACH_M:
+                    inside.append(each)
             if outside := len(far) - len(inside):
                 text = f"detections are outside of the home, by up to {max(far):.1f} m: left out"
                 self._count("outside", f"{message.entity}: {text}", outside)

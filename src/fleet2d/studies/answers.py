@@ -376,12 +376,16 @@ def group_means(
     rows = []
     for key, group in groups.items():
         mean = estimate_units(group, units, column, limits)
-        labels = dict(zip(axes, key, strict=True))
-        spread = float(group[column].std() or 0.0)
-        rows.append(
-            {**labels, "mean": mean.mean, "low": mean.low, "high": mean.high, "doubt": mean.doubt,
-             "deviation": spread, "variants": len(group)}
-        )  # fmt: skip
+        row = {
+            **dict(zip(axes, key, strict=True)),
+            "mean": mean.mean,
+            "low": mean.low,
+            "high": mean.high,
+            "doubt": mean.doubt,
+            "deviation": float(group[column].std() or 0.0),
+            "variants": len(group),
+        }
+        rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
@@ -390,9 +394,10 @@ def _between(frame: "pl.DataFrame", metric: str, *columns: str) -> float:
     import polars as pl
 
     groups = frame.group_by(columns, maintain_order=True)
-    cells = groups.agg(pl.col(metric).mean(), pl.len().alias(VARIANT))
+    cells = groups.agg(pl.col(metric).mean(), count=pl.len())
     mean = float(frame[metric].mean())
-    return sum_in_order((cells[VARIANT] * (cells[metric] - mean) ** 2).to_list())
+    squares = cells["count"] * (cells[metric] - mean) ** 2
+    return sum_in_order(squares.to_list())
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

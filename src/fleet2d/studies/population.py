@@ -318,9 +318,9 @@ class LifeFinder:
         new = {repr(c): (c, name) for c, name in zip(changes, names, strict=True)}
         keys = [key for key in new if key not in self._facts and key not in self._unbuilt]
         tasks = ((1, iter([HomeTask(i, i, "", "", new[k][0])])) for i, k in enumerate(keys))
-        crew = (
-            self._crew if len(keys) > FEW_HOMES else Crew(SerialExecutor(), plans=self._crew.plans)
-        )
+        crew = self._crew
+        if len(keys) <= FEW_HOMES:
+            crew = Crew(SerialExecutor(), plans=crew.plans)
         problems: dict[int, str] = {}
         by_chance = set[int]()
         done = 0

@@ -93,10 +93,11 @@ def execute(
         )
     wall_s = {**finished.manifest["wall_s"], "total": time.perf_counter() - start_s}
     patterns = tuple(metrics)
+    numbers = flat_numbers(finished.metrics)
     return VariantOutcome(
         "complete",
         finished.digest,
-        {name: value for name, value in flat_numbers(finished.metrics) if is_kept(name, patterns)},
+        {name: value for name, value in numbers if is_kept(name, patterns)},
         {name: finished.tables[name] for name in tables if name in finished.tables} | days,
         wall_s,
         peak_memory_mb() or 0.0,
@@ -109,16 +110,14 @@ def _run_by_day(scenario: Scenario, metrics: Sequence[str]) -> "tuple[Run, pa.Ta
 
     simulation = Simulation(scenario)
     steps_of_day = DAY_US // simulation.clock.step_us
-    rows: list[tuple[int, str, float]] = []
-    day = 0
-    while simulation.step + steps_of_day <= simulation.clock.steps:
+    rows: list[dict[str, Any]] = []
+    for day in range(simulation.clock.steps // steps_of_day):
         simulation.advance(steps_of_day)
         numbers = dict(flat_numbers(results_so_far(simulation)))
-        rows += [(day, name, numbers[name]) for name in metrics if name in numbers]
-        day += 1
-    days, names, values = zip(*rows, strict=True) if rows else ((), (), ())
-    columns = {"day": pa.array(days, pa.int32()), "metric": pa.array(names, pa.string())}
-    return simulation.run(), pa.table({**columns, "value": pa.array(values, pa.float64())})
+        known = [name for name in metrics if name in numbers]
+        rows += [{"day": day, "metric": name, "value": numbers[name]} for name in known]
+    columns = {"day": pa.int32(), "metric": pa.string(), "value": pa.float64()}
+    return simulation.run(), pa.Table.from_pylist(rows, pa.schema(columns))
 
 
 def is_kept(metric: str, patterns: Iterable[str]) -> bool:

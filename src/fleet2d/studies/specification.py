@@ -300,8 +300,10 @@ class StudyFile(Settings):
     @property
     def populations(self) -> tuple[str, ...]:
         """The columns whose values are a sample of a population, the seed last."""
-        columns = (c for name, axis in self.axes.items() for c in axis.populations(name))
-        return (*columns, *([] if self.fleet else [SEED]))
+        columns = [c for name, axis in self.axes.items() for c in axis.populations(name)]
+        if not self.fleet:
+            columns.append(SEED)
+        return tuple(columns)
 
     @property
     def fleet(self) -> str:

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from datetime import date, timedelta
+from itertools import cycle
 from pathlib import Path
 from typing import NamedTuple
 
@@ -93,18 +94,17 @@ def _diary_figure(persona: Persona, name: str, days: Days) -> Figure:
         for episode in without_interruptions(episodes):
             span = (episode.begin / HOUR_S, (episode.end - episode.begin) / HOUR_S)
             axes.broken_barh([span], (row, 0.62), facecolors=colors[episode.activity])
-        marks = [
-            (episode.begin / HOUR_S, max(episode.end - episode.begin, 120) / HOUR_S)
-            for episode in episodes
-            if episode.role in INTERRUPTION_ROLES
-        ]
+        marks = []
+        for episode in episodes:
+            if episode.role in INTERRUPTION_ROLES:
+                visible_s = max(episode.end - episode.begin, 120)
+                marks.append((episode.begin / HOUR_S, visible_s / HOUR_S))
         axes.broken_barh(marks, (row + 0.66, 0.22), facecolors=NEED_COLOR)
-    axes.set_yticks(
-        [row + 0.4 for row in range(len(days))],
-        [f"{WEEKDAYS[day.weekday()][:3]} {day:%d.%m.}" for day, _ in days],
-    )
+    dates = [f"{WEEKDAYS[day.weekday()][:3]} {day:%d.%m.}" for day, _ in days]
+    axes.set_yticks(np.arange(len(days)) + 0.4, dates)
     axes.set(xlim=(4, HOURS), xlabel="hour", title=f"{name}: {persona.about}")
-    axes.set_xticks(range(4, HOURS + 1, 2), [f"{hour % 24}" for hour in range(4, HOURS + 1, 2)])
+    hours = range(4, HOURS + 1, 2)
+    axes.set_xticks(hours, [f"{hour % 24}" for hour in hours])
     axes.invert_yaxis()
     patches = [Patch(color=color, label=label.replace("_", " ")) for label, color in colors.items()]
     patches.append(Patch(color=NEED_COLOR, label="needs and errands"))
@@ -115,11 +115,12 @@ def _diary_figure(persona: Persona, name: str, days: Days) -> Figure:
 def _colors(persona: Persona, days: Days) -> dict[str, str | tuple[float, ...]]:
     names = {each.activity for _, day in days for each in without_interruptions(day)}
     all_colors = mpl.colormaps["tab20"].colors  # type: ignore[attr-defined]
-    palette = [color for i, color in enumerate(all_colors) if i not in GREYS]
-    home = [n for n in sorted(names) if n != "sleep" and not persona.activity(n).away]
+    palette = cycle(color for i, color in enumerate(all_colors) if i not in GREYS)
+    away = [name for name in sorted(names) if persona.activity(name).away]
+    home = sorted(names - {"sleep", *away})
     colors: dict[str, str | tuple[float, ...]] = {"sleep": SLEEP_COLOR}
-    colors |= {name: palette[i % len(palette)] for i, name in enumerate(home)}
-    return colors | {n: AWAY_COLOR for n in sorted(names) if persona.activity(n).away}
+    colors |= zip(home, palette, strict=False)
+    return colors | dict.fromkeys(away, AWAY_COLOR)
 
 
 LIKELIEST_COLOR = "#b5305c"
@@ -152,9 +153,8 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
     users = run.manifest["entities"]["users"]
     places = len(run.plan.rooms) + 1
     # An update has a row for each place of each user, and of anyone; the last place is away.
-    if not {"user", "room", "share"} <= set(table.column_names) or ANYONE not in set(
-        table["user"][: places * (len(users) + 1)].to_pylist()
-    ):
+    is_presence = {"user", "room", "share"} <= set(table.column_names)
+    if not is_presence or ANYONE not in table["user"][: places * (len(users) + 1)].to_pylist():
         raise ArtifactError(
             f"{algorithm} stored {', '.join(table.column_names[2:])}, no room probabilities: choose"
             " a presence algorithm such as ltp or rtp"
@@ -171,7 +171,7 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
         is_away = path.away[steps]
         home = shares[:, row, :-1]
         away = shares[:, row, -1]
-        belief = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)
+        belief = np.column_stack([home * (1 - away)[:, None], away])
         has_place = is_away | (room >= 0)  # some cells belong to no room
         beliefs.append(belief[has_place])
         truths.append(np.where(is_away, places - 1, room)[has_place])
