@@ -186,7 +186,7 @@ class SightingErrors:
         return rows[is_kept], differs
 
     def _change(self, c: int, rows: I64, looks: I64, body: PoseColumns, memory: SightMemory) -> I64:
-        """Return the sightings of some looks of a camera; the body is at a place in each."""
+        """Return a camera's sightings in some looks, changed by its errors."""
         camera = self._cameras[c]
         errors = camera.errors
         if self._owner.home.unlit:

@@ -268,18 +268,18 @@ def _place(location: Location, content: Any) -> str:
     return place
 
 
-def _sentence(line: ErrorDetails) -> str:
+def _sentence(error: ErrorDetails) -> str:
     """Return what is wrong with a value, as the rest of a sentence that begins with its place."""
-    if line["type"] == "problem":
-        return line["msg"]
-    if line["type"] == "missing":
-        return f"has no key {line['loc'][-1]!r}"
-    context = line.get("ctx", {})
-    expected = _EXPECTED.get(line["type"], "").format(**context)
-    if line["type"] == "literal_error":
+    if error["type"] == "problem":
+        return error["msg"]
+    if error["type"] == "missing":
+        return f"has no key {error['loc'][-1]!r}"
+    context = error.get("ctx", {})
+    expected = _EXPECTED.get(error["type"], "").format(**context)
+    if error["type"] == "literal_error":
         expected = "one of " + ", ".join(re.findall(r"'([^']*)'", context["expected"]))
-    reason = f"{expected} is expected" if expected else line["msg"]
-    return f"is {shown_value(line['input'])}: {reason}"
+    reason = f"{expected} is expected" if expected else error["msg"]
+    return f"is {shown_value(error['input'])}: {reason}"
 
 
 def shown_value(value: object) -> str:

@@ -191,7 +191,7 @@ def maximum_area(bedrooms: int, bathrooms: int) -> float:
     return round(0.56 * fsum(SIZES[kind].max_area for kind in kinds), 1)
 
 
-# What else a home may have: the type of room, from which area on [m²], and its probability [%].
+# What else a home may have: the type of room, from how large a home [m²], and how probably [%].
 OPTIONAL = (
     ("dining_room", 62, 70),
     ("entryway", 70, 62),

@@ -51,7 +51,7 @@ _EXPECTED = "expected a history of Home Assistant, [[{entity_id, state, last_cha
 def reader_of(path: Path) -> Callable[[Path], Iterator[StateRow]] | None:
     """Return what reads a database or a history; None: the file is neither, or no regular file.
 
-    Lines of JSON are no history.
+    A file of JSON Lines isn't a history.
     """
     if not path.is_file() or path.suffix.lower() in (".jsonl", ".ndjson"):
         return None
