@@ -60,3 +60,8 @@ def test_the_retired_are_out_for_2_to_4_h_a_day(name, often):
             was_out = is_out
     assert often == pytest.approx(outings / days, abs=0.25)
     assert 2 < out_s / HOUR / days < 4
+
+
+def test_a_persona_of_which_only_a_key_is_given_is_told_to_extend_another_one():
+    with pytest.raises(ValidationError, match="a persona needs days, or"):
+        read({"pace": 2})

@@ -502,6 +502,10 @@ def read_persona(value: object) -> Any:
     """
     if isinstance(value, str) and value in bundled_names():
         return bundled_persona(value)
+    if isinstance(value, Mapping) and not {"extends", "days"} & value.keys():
+        raise problem(
+            "a persona needs days, or the one that it changes, like {extends: retired, pace: 0.8}"
+        )
     return _data_of(value, (), [])
 
 
