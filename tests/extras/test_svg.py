@@ -150,3 +150,33 @@ def test_the_hole_of_a_wall_is_no_wall(tmp_path):
 
     assert (85 / 90) ** 2 * plan.area_m2 == pytest.approx(unscaled.area_m2, rel=0.01)
     assert "by the width of 1 doors" in unscaled.notes[0]
+
+
+ROOMS = """<g id="rooms"><rect id="kitchen" width="40" height="30"/>
+<rect id="bedroom" x="41" width="40" height="30"/></g>"""
+
+DOUBLE = """<g id="rooms"><rect id="kitchen" width="80" height="60"/>
+<rect id="bedroom" x="82" width="80" height="60"/></g>"""
+
+
+@pytest.mark.parametrize(
+    ("size", "body"),
+    [
+        ('width="100mm" height="50mm" viewBox="0 0 100 50"', ROOMS),
+        ('width="5cm" height="2.5cm" viewBox="0 0 100 50"', ROOMS),
+        ("", f'<g transform="rotate(30)"><g transform="scale(0.5)">{DOUBLE}</g></g>'),
+        (
+            'width="100mm" height="50mm" viewBox="0 0 100 50"',
+            """<symbol id="box"><rect width="40" height="30"/></symbol><g id="rooms">
+            <use id="kitchen" href="#box"/><use id="bedroom" href="#box" x="41"/></g>""",
+        ),
+    ],
+    ids=["millimetres of paper", "centimetres of paper", "turned", "used"],
+)
+def test_rectangles_have_their_places_and_sizes_in_units_of_the_drawing(tmp_path, size, body):
+    drawing = f'<svg xmlns="http://www.w3.org/2000/svg" {size}>{body}</svg>'
+
+    plan = Svg(path=write(tmp_path, drawing), scale=0.1).load()
+
+    areas = {room.type: room.area_m2 for room in plan.rooms}
+    assert areas == pytest.approx({"kitchen": 12.0, "bedroom": 12.0}, abs=0.05)

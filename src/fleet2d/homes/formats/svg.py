@@ -109,11 +109,16 @@ class Svg(FileSource):
 
 
 def _read(content: bytes, path: Path) -> Any:
-    """Return the groups of an SVG file."""
+    """Return the groups of an SVG file, in the units of its viewBox."""
     with extra("svg", "reading SVG needs svgelements"):
         import svgelements
     with reading(path, "SVG"):
-        return svgelements.SVG.parse(BytesIO(content), reify=True, ppi=96)
+        drawing = svgelements.SVG.parse(BytesIO(content), reify=True, ppi=96)
+        to_units = ~svgelements.Matrix(drawing.viewbox_transform)
+        for element in drawing.elements():
+            if isinstance(element, svgelements.Shape | svgelements.Text):
+                element *= to_units
+        return drawing
 
 
 def _shapes(
@@ -128,11 +133,11 @@ def _shapes(
         name: The name of the nearest group that has one.
         only_rooms: Whether shapes count that have the name of a room, and no others.
     """
-    from svgelements import Group, Path, Shape
+    from svgelements import Group, Path, Shape, Use
 
     for element in group:
         named = _name(element)
-        if isinstance(element, Group):
+        if isinstance(element, Group | Use):
             yield from _shapes(element, named or name, only_rooms=only_rooms)
         elif isinstance(element, Shape):
             kind = _kind(named) or _kind(name)
@@ -143,7 +148,7 @@ def _shapes(
                 own = next((word for word in (named, name) if _is_room(word)), "")
                 kind = "room" if own and not kind else ""
             is_line = kind == "wall" and element.fill.value is None
-            parts = Path(element).as_subpaths() if kind else ()
+            parts = abs(Path(element)).as_subpaths() if kind else ()
             drawn = [_corners(Path(part)) for part in parts]
             rings = [ring for ring in drawn if len(ring) > 1 and np.isfinite(ring).all()]
             closed = [len(r) > 3 and bool((r[0] == r[-1]).all()) and not is_line for r in rings]
@@ -170,10 +175,10 @@ def _is_room(name: str) -> bool:
 
 def _texts(group: Any) -> Iterator[tuple[str, F64]]:
     """Yield each text with its place, float64 (2,)."""
-    from svgelements import Group, Matrix, Text
+    from svgelements import Group, Matrix, Text, Use
 
     for element in group:
-        if isinstance(element, Group):
+        if isinstance(element, Group | Use):
             yield from _texts(element)
         elif isinstance(element, Text) and element.text:
             x, y = Matrix(element.transform).point_in_matrix_space((element.x, element.y))
