@@ -113,8 +113,9 @@ def _chosen(run: Run, who: str, of: str) -> list[Stay]:
     if rooms:
         return [stay for stay in stays_of(run, who, "room") if stay.what in rooms]
     activities = stays_of(run, who, "activity")
-    known = [*(room.name for room in run.plan.rooms), *(stay.what for stay in activities), AWAY]
-    check_known(of, "room or activity", list(dict.fromkeys(known)), InputError)
+    known = [room.name for room in run.plan.rooms]
+    known += [stay.what for stay in activities]
+    check_known(of, "room or activity", list(dict.fromkeys([*known, AWAY])), InputError)
     return [stay for stay in activities if stay.what == of]
 
 

@@ -40,10 +40,13 @@ def twists(plan: "FloorPlan", before: F64, after: F64, passed_s: float) -> F64:
     share = np.divide(length, covered, out=np.ones(len(after)), where=covered > 0)
     x = x * share
     y = y * share
-    cos = np.cos(after[:, 2])
-    sin = np.sin(after[:, 2])
-    turned = (after[:, 2] - before[:, 2] + np.pi) % (2 * np.pi) - np.pi
-    return np.stack([x * cos + y * sin, y * cos - x * sin, turned], axis=-1) / passed_s
+    heading = after[:, 2]
+    cos = np.cos(heading)
+    sin = np.sin(heading)
+    ahead = x * cos + y * sin
+    left = y * cos - x * sin
+    turned = (heading - before[:, 2] + np.pi) % (2 * np.pi) - np.pi
+    return np.stack([ahead, left, turned], axis=-1) / passed_s
 
 
 def _off(poses: F64, place: F64) -> F64:

@@ -138,7 +138,8 @@ def draw_course(
 
     labels = [None] if axis is None else frame[axis].unique(maintain_order=True).to_list()
     days = frame[DAY].unique().sort().to_numpy()
-    moments = days[np.unique(np.linspace(0, len(days) - 1, MOMENTS).round().astype(int))]
+    numbers = np.linspace(0, len(days) - 1, MOMENTS).round().astype(int)
+    moments = days[np.unique(numbers)]
     figure, axes = _figure(3.0)
     for number, value in enumerate(labels[:MAX_LINES]):
         group = frame if axis is None else frame.filter(pl.col(axis).eq_missing(value))

@@ -238,8 +238,9 @@ def find_lives(
 
 def first_life(axis: PopulationAxis, column: str) -> FleetLives:
     """Return the first life of a population, whose home isn't built yet."""
-    features = {"rooms": np.zeros(1, np.int32), BEDROOMS: np.zeros(1, np.int32)}
-    return FleetLives(column, axis.draw, np.zeros(1, np.int32), {**features, AREA: np.zeros(1)})
+    number = np.zeros(1, np.int32)
+    features = {"rooms": number, BEDROOMS: number, AREA: np.zeros(1)}
+    return FleetLives(column, axis.draw, number, features)
 
 
 class LifeFinder:
@@ -317,14 +318,15 @@ class LifeFinder:
         """
         new = {repr(c): (c, name) for c, name in zip(changes, names, strict=True)}
         keys = [key for key in new if key not in self._facts and key not in self._unbuilt]
-        tasks = ((1, iter([HomeTask(i, i, "", "", new[k][0])])) for i, k in enumerate(keys))
+        tasks = [HomeTask(i, i, "", "", new[key][0]) for i, key in enumerate(keys)]
+        homes = ((1, iter([task])) for task in tasks)
         crew = self._crew
         if len(keys) <= FEW_HOMES:
             crew = Crew(SerialExecutor(), plans=crew.plans)
         problems: dict[int, str] = {}
         by_chance = set[int]()
         done = 0
-        with closing(run_tasks(crew, FactsJob(self._base), TaskQueue(tasks))) as rounds:
+        with closing(run_tasks(crew, FactsJob(self._base), TaskQueue(homes))) as rounds:
             for ends in rounds:
                 done += len(ends)
                 self._on_progress(done, len(keys))

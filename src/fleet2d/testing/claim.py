@@ -263,7 +263,9 @@ def steps_of(accept: I64, refuse: I64, rate: float) -> "list[tuple[float, float,
         mass[1:] += undecided[:-1] * (1 - rate)
         is_accepted = failures <= accept[number]
         is_refused = failures >= refuse[number]
-        steps.append((float(mass[is_accepted].sum()), float(mass[is_refused].sum()), mass))
+        accepted = float(mass[is_accepted].sum())
+        refused = float(mass[is_refused].sum())
+        steps.append((accepted, refused, mass))
         undecided = np.where(is_accepted | is_refused, 0.0, mass)
     return steps
 

@@ -192,7 +192,8 @@ def _scenario_text(
     from fleet2d.scenario.compose import assignment, merge
 
     content = Document()
-    for keys, value in [(("simulation", "seed"), failure.seed), *job.space.changes(failure.point)]:
+    changes = [(("simulation", "seed"), failure.seed), *job.space.changes(failure.point)]
+    for keys, value in changes:
         content = merge(content, assignment(keys, value, ""))
     source = target.partition("::")[0]
     data: dict[str, Any]

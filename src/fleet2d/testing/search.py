@@ -6,7 +6,7 @@ import math
 import random
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -202,10 +202,13 @@ class TryJob:
         Raises:
             InputError: A key or a value is wrong.
         """
-        ends = {n: p.choices or (p.at(0.0), p.at(1.0)) for n, p in self.space.ranges.items()}
-        numbers = {name: range(len(choices)) for name, choices in self.space.choices.items()}
-        for name, values in {**ends, **numbers}.items():
-            for value in values:
+        values: dict[str, Iterable[Any]] = {}
+        for name, parameter in self.space.ranges.items():
+            values[name] = parameter.choices or (parameter.at(0.0), parameter.at(1.0))
+        for name, choices in self.space.choices.items():
+            values[name] = range(len(choices))
+        for name, tried in values.items():
+            for value in tried:
                 with errors_as(None, f"over {name}", of=Fleet2DError):
                     self.scenario({name: value}, 0)
 

@@ -92,8 +92,8 @@ def draw_failure(
         if evidence is not None:
             _mark(run.plan, stage, evidence, axes)
         moment = f"{run.clock.time(step):%a %d %b %H:%M:%S}, step {step}"
-        lines = textwrap.wrap(text, round(width * 14))[:3]
-        figure.text(0.02, 1 - 0.08 / whole, "\n".join([moment, *lines]), va="top", fontsize=8)
+        lines = [moment, *textwrap.wrap(text, round(width * 14))[:3]]
+        figure.text(0.02, 1 - 0.08 / whole, "\n".join(lines), va="top", fontsize=8)
         for number, course in enumerate(courses):
             bottom = (lower - COURSE_IN * (number + 1)) / whole
             below = figure.add_axes((0.09, bottom, 0.88, (COURSE_IN - 0.3) / whole))
@@ -235,7 +235,8 @@ def draw_heat(run: Run, names: list[str], axes: Axes) -> ScalarMappable:
     # The scale follows the square root: else hours in bed hide all other places.
     colors = ScalarMappable(PowerNorm(0.5, 0, high), COLORS)
     image = colors.to_rgba(hours)
-    image[..., 3] = np.clip(np.sqrt(hours / high) * 3, 0, 0.85) * plan.free
+    opacity = np.clip(np.sqrt(hours / high) * 3, 0, 0.85)
+    image[..., 3] = opacity * plan.free
     draw_cells(plan, image, axes, interpolation="bilinear", zorder=2.1)
     return colors
 

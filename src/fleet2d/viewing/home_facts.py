@@ -143,7 +143,9 @@ def placed_symbol(item: PlacedObject) -> SymbolPlace:
     across = corners @ right
     wide = float(np.ptp(across))
     deep = float(np.ptp(along))
-    middle = (across.min() + wide / 2) * right + (along.min() + deep / 2) * forward
+    middle_across = across.min() + wide / 2
+    middle_along = along.min() + deep / 2
+    middle = middle_across * right + middle_along * forward
     is_box = item.footprint.area > BOX_SHARE * wide * deep
     x, y = np.round(middle, DIGITS).tolist()
     return SymbolPlace((x, y), wide, deep, is_box, right, forward)
@@ -178,8 +180,9 @@ def runs_of(cells: I16) -> list[int]:
     """
     flat = cells.ravel()
     ends = np.append(np.flatnonzero(np.diff(flat)) + 1, len(flat))
-    pairs = np.stack([flat[ends - 1].astype(np.int64), np.diff(ends, prepend=0)], axis=1)
-    return pairs.ravel().tolist()
+    values = flat[ends - 1].astype(np.int64)
+    counts = np.diff(ends, prepend=0)
+    return np.stack([values, counts], axis=1).ravel().tolist()
 
 
 def points(coordinates: NDArray[Any]) -> list[Point]:
@@ -285,11 +288,12 @@ class WallsHistory:
 
     def _number(self) -> int:
         """Return the id of the present set of walls."""
-        tall = (item for item in self._home.objects if item.blocks == "sight")
-        key = (self._home.shut, tuple((item.name, item.footprint.wkb) for item in tall))
+        home = self._home
+        tall = [(item.name, item.footprint.wkb) for item in home.objects if item.blocks == "sight"]
+        key = (home.shut, *tall)
         if key not in self._numbers:
             self._numbers[key] = len(self.meshes)
-            self.meshes.append(self._home.walls)
+            self.meshes.append(home.walls)
         return self._numbers[key]
 
 

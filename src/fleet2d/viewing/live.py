@@ -73,9 +73,11 @@ class LiveEngine:
             return []
         now_us = self.simulation.step * self.simulation.clock.step_us
         track = actor.motion.breakpoints
-        first, end = np.searchsorted(track.time, [now_us, now_us + AHEAD_US], side="right").tolist()
-        corners = np.stack([track.time, track.x, track.y], axis=1)[first:end]
-        return [(time, x, y) for time, x, y in corners[:MAX_CORNERS].tolist()]
+        ends_us = [now_us, now_us + AHEAD_US]
+        first, end = np.searchsorted(track.time, ends_us, side="right").tolist()
+        part = slice(first, min(end, first + MAX_CORNERS))
+        columns = (track.time[part].tolist(), track.x[part].tolist(), track.y[part].tolist())
+        return list(zip(*columns, strict=True))
 
     def in_view(self) -> list[tuple[str, str]]:
         """Return (robot, user) pairs: the users that each robot has in view."""

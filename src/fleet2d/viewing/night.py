@@ -99,7 +99,8 @@ class Light:
         if lit:
             self._veil[np.isin(self._plan.room_of_place, sorted(lit))] = red
         self.image.set_data(self._veil)
-        self.walls.set(facecolor=tuple(_over(red, dark).tolist()), visible=self.image.get_visible())
+        self.walls.set_facecolor(tuple(_over(red, dark).tolist()))
+        self.walls.set_visible(self.image.get_visible())
 
     def _is_on(self, room: str, step: int) -> bool:
         is_on = self._last(f"light of {room}", step)
@@ -132,7 +133,9 @@ def sky_at(
     hour = moment.hour + moment.minute / 60 + moment.second / 3600
     rise = (hour - dark_until) / (light_from - dark_until)
     fall = (hour - light_until) / (dark_from - light_until)
-    bright = min(max(rise, 0.0), 1.0) * (1 - min(max(fall, 0.0), 1.0))
+    risen = min(max(rise, 0.0), 1.0)
+    fallen = min(max(fall, 0.0), 1.0)
+    bright = risen * (1 - fallen)
     # Half an hour from sunrise or sunset the sky is redder than an hour away.
     away = min(abs(rise - 0.5), abs(fall - 0.5))
     return bright, 0.5 * max(0.0, 1 - away / 0.7)
@@ -140,7 +143,8 @@ def sky_at(
 
 def _over(upper: F64, lower: F64) -> F64:
     """Return the colour of two veils (red, green, blue, opacity), one over the other."""
-    opacity = upper[3] + lower[3] * (1 - upper[3])
+    seen_below = lower[3] * (1 - upper[3])
+    opacity = upper[3] + seen_below
     if not opacity:
         return np.zeros(4)
     mixed = upper[:3] * upper[3] + lower[:3] * lower[3] * (1 - upper[3])

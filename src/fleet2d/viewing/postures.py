@@ -171,9 +171,11 @@ def _stays_of(user: int, keys: _Keys, end_us: int) -> PersonStays:
     since = keys.holds_us[begins]
     until = np.append(since[1:], end_us)[piece]
     follows = ~np.append(begins[1:], True)
-    moves = follows & (np.roll(keys.places, -1, axis=0) != keys.places).any(axis=1)
+    next_places = np.roll(keys.places, -1, axis=0)
+    next_time_us = np.roll(keys.time_us, -1)
+    moves = follows & (next_places != keys.places).any(axis=1)
     begin = np.maximum(keys.time_us, since[piece])
-    end = np.where(follows, np.minimum(np.roll(keys.time_us, -1), until), until)
+    end = np.where(follows, np.minimum(next_time_us, until), until)
     stays = ~moves & ~keys.away & (end > begin)
     return PersonStays(user, begin[stays], end[stays], keys.places[stays])
 
@@ -190,4 +192,5 @@ def _rests_of(stays: PersonStays, rests: F64) -> tuple[I64, I64, I64, I64]:
     leaves = (begin[1:] != end[:-1]) | (use[1:] != use[:-1])
     begins = np.append(True, leaves)[: len(use)]
     ends = np.append(leaves, True)[: len(use)]
-    return np.full(np.count_nonzero(begins), stays.user), use[begins], begin[begins], end[ends]
+    user = np.full(np.count_nonzero(begins), stays.user)
+    return user, use[begins], begin[begins], end[ends]

@@ -255,8 +255,10 @@ def _extend(lane: SightingFacts, step: I64, false: Bool, gap: int) -> None:
     first = step[np.append(True, cuts)].tolist()
     last = step[np.append(cuts, True)].tolist()
     is_false = false[np.append(True, cuts)].tolist()
-    if lane["last"] and first[0] - lane["last"][-1] <= gap and is_false[0] == lane["false"][-1]:
-        del lane["last"][-1], first[0], is_false[0]
+    if lane["last"]:
+        is_near = first[0] - lane["last"][-1] <= gap
+        if is_near and is_false[0] == lane["false"][-1]:
+            del lane["last"][-1], first[0], is_false[0]
     lane["first"] += first
     lane["last"] += last
     lane["false"] += is_false

@@ -200,7 +200,8 @@ class DatasetPlan:
         """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""
         lives = self.numbers[split]
         # Fresh runs have no end: then with further lives, or those that meet the conditions again.
-        life = self.draws[split].life(lives[k % len(lives)] if self.file.splits[split].where else k)
+        drawn = lives[k % len(lives)] if self.file.splits[split].where else k
+        life = self.draws[split].life(drawn)
         number = self._first_number(split) + k
         scenario = self._scenario(life)
         scenario["simulation"]["seed"] = (self.file.seed * SEED_STEP + number) % MAX_SEED

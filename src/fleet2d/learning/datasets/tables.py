@@ -198,7 +198,8 @@ def _belief(run: "Run", name: str) -> dict[str, Any]:
     """Return the rows of the belief of a model about each user."""
     rows = run.arrow(name)
     rows = rows.filter(number_array(values_of(rows["user"]) != ANYONE, pa.bool_()))
-    share = values_of(rows["share"]).reshape(-1, len(run.plan.rooms) + 1).copy()  # away last
+    places = len(run.plan.rooms) + 1  # away last
+    share = values_of(rows["share"]).reshape(-1, places).copy()
     share[:, :-1] *= 1 - share[:, -1:]  # of all time, not given at home
     at = "at" if "at" in rows.column_names else "step"  # of `belief_table`, of `rtp`
     return {
@@ -219,7 +220,8 @@ def _array(values: Any, kind: pa.DataType) -> Any:
     if kind == pa.string():
         return text_array(values, np.arange(len(values)))
     numbers = np.asarray(values)
-    missing = np.isnan(numbers) if kind in (pa.int16(), pa.int32(), pa.int64()) else None
-    if missing is not None and missing.any():
+    missing = None
+    if pa.types.is_integer(kind):
+        missing = np.isnan(numbers)
         numbers = np.where(missing, 0, numbers)
     return number_array(numbers.astype(kind.to_pandas_dtype()), kind, missing)

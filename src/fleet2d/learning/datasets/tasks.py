@@ -241,8 +241,13 @@ def forecasts(data: Dataset, split: str, networks: Networks = SHIPPED) -> SplitF
 
 def _stacked(beliefs: Sequence[F64]) -> F64:
     """Return beliefs in several homes as one; homes with fewer places have zeros."""
-    width = max(belief.shape[1] for belief in beliefs)
-    return np.concatenate([np.pad(each, ((0, 0), (0, width - each.shape[1]))) for each in beliefs])
+    whole = np.zeros((sum(map(len, beliefs)), max(belief.shape[1] for belief in beliefs)))
+    begin = 0
+    for belief in beliefs:
+        end = begin + len(belief)
+        whole[begin:end, : belief.shape[1]] = belief
+        begin = end
+    return whole
 
 
 def _score_rtp(data: Dataset, split: str, networks: Networks) -> Scores:
@@ -322,7 +327,10 @@ def _score_ltp(data: Dataset, split: str, _: object) -> Scores:
         for name, guess in guesses.items():
             error = float(np.abs(guess / guess.sum() - truth).sum() / 2)
             errors.setdefault(name, []).append(error)
-    return {name: ({"tv": float(np.mean(own))}, len(own)) for name, own in errors.items()}
+    found: Scores = {}
+    for name, own in errors.items():
+        found[name] = {"tv": float(np.mean(own))}, len(own)
+    return found
 
 
 def _next_rooms(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
@@ -372,10 +380,10 @@ def _score_time_to_return(data: Dataset, split: str, _: object) -> Scores:
     for each in np.unique(hour):
         by_hour[each] = np.median(known[hour == each])
     guesses = {"median": np.full(len(truth), overall), "median by hour": np.take(by_hour, asked)}
-    return {
-        name: ({"mae_min": float(np.abs(guess - truth).mean())}, len(truth))
-        for name, guess in guesses.items()
-    }
+    found: Scores = {}
+    for name, guess in guesses.items():
+        found[name] = {"mae_min": float(np.abs(guess - truth).mean())}, len(truth)
+    return found
 
 
 def _score_shares(

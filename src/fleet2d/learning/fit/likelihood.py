@@ -136,8 +136,9 @@ class ProductLikelihood:
 
     def _value(self, shares: F64) -> float:
         """Return the log-likelihood of the probabilities of the rows."""
-        hit = self.outcomes
-        return float(np.log(shares[hit]).sum() + np.log1p(-shares[~hit]).sum())
+        hits = np.log(shares[self.outcomes])
+        misses = np.log1p(-shares[~self.outcomes])
+        return float(hits.sum() + misses.sum())
 
     def _climb(self, theta: F64, free: Bool) -> Fit:
         """Return the maximum over the free parameters, by damped Fisher scoring from `theta`."""

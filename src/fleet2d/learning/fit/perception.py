@@ -357,7 +357,8 @@ def _shares(counts: dict[str, int]) -> dict[str, float]:
     total = sum(counts.values())
     shares = {name: round(count / total, 4) for name, count in counts.items()}
     most = max(shares, key=lambda name: shares[name])
-    shares[most] = round(1 - sum_in_order(v for name, v in shares.items() if name != most), 4)
+    others = [share for name, share in shares.items() if name != most]
+    shares[most] = round(1 - sum_in_order(others), 4)
     return shares
 
 

@@ -221,7 +221,8 @@ class _Fitter:
 
     def sleep(self) -> None:
         """Describe sleep, in the place where the person sleeps most."""
-        state = max(sleep_states(self.timeline), key=lambda s: (self.timeline.minutes == s).sum())
+        minutes = self.timeline.minutes
+        state = max(sleep_states(self.timeline), key=lambda state: (minutes == state).sum())
         self._add("sleep", state, posture="lie")
 
     def rest(self, days: Sequence[LivedDay]) -> None:

@@ -257,7 +257,8 @@ def _side_by_side(blocks: Sequence[Block]) -> U8:
     """Return the messages of blocks, those of the same time next to each other."""
     if len(blocks) == 1:
         return blocks[0].data
-    return np.concatenate([b.data.reshape(len(b.times), -1) for b in blocks], axis=1).ravel()
+    tables = [block.data.reshape(len(block.times), -1) for block in blocks]
+    return np.concatenate(tables, axis=1).ravel()
 
 
 def _record(code: int, *parts: bytes) -> bytes:

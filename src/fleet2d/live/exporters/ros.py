@@ -366,7 +366,8 @@ class Template:
 def _codes(column: "pa.ChunkedArray") -> tuple[I64, list[str]]:
     """Return a column of words as indices of its words, -1 where there is none."""
     words = column.combine_chunks().dictionary_encode()
-    return words.indices.fill_null(-1).to_numpy().astype(np.int64), words.dictionary.to_pylist()
+    codes = words.indices.fill_null(-1).to_numpy()
+    return codes.astype(np.int64), words.dictionary.to_pylist()
 
 
 def _quaternion(heading: Any) -> tuple[Any, Any]:

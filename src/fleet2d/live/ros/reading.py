@@ -127,7 +127,8 @@ def contents_of(
         content["time"] = stamp_ns / 1e9
     elif stamp_ns:
         yield PeerFault("of a simulated clock", f"{topic}: nobody knows which messages are late")
-    (heading,) = headings_of(np.array([[turn.x, turn.y, turn.z, turn.w]], np.float64))
+    quaternion = np.array([turn.x, turn.y, turn.z, turn.w], np.float64)
+    (heading,) = headings_of(quaternion[None])
     if math.isfinite(heading):
         content["heading_deg"] = math.degrees(heading)
     else:

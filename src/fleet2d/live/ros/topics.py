@@ -297,7 +297,8 @@ def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:
     pieces = visible_region(walls, x, y)
     if not len(pieces[0]):
         return np.zeros(BEAMS)
-    ends = region_outline(walls, x, y, *pieces)[0].reshape(-1, 2, 2) - np.array([x, y])
+    outline, *_ = region_outline(walls, x, y, *pieces)
+    ends = outline.reshape(-1, 2, 2) - np.array([x, y])
     right = ends[:, 0]
     left = ends[:, 1]
     turn = 2 * math.pi

@@ -138,7 +138,8 @@ def parse_pose(text: str) -> CameraPose:
     try:
         numbers = [float(part) for part in text.split(",")]
         pose = CameraPose(*numbers)
-        is_valid = 0 < pose.far <= 1000 and 0 < pose.angle_deg <= 360 and np.isfinite(numbers).all()
+        is_in_range = 0 < pose.far <= 1000 and 0 < pose.angle_deg <= 360
+        is_valid = is_in_range and np.isfinite(numbers).all()
     except (ValueError, TypeError):
         is_valid = False
     if not is_valid:
@@ -178,12 +179,13 @@ def region_panel(plan: FloorPlan, pose: CameraPose, axes: Axes, title: str) -> N
     _draw_plan(plan, axes, title)
     half = pose.angle_deg / 2
     ends = (pose.heading_deg - half, pose.heading_deg + half)
-    sector = Wedge((pose.x, pose.y), pose.far, *ends, fill=False, ec=VIEW_EDGE, lw=0.8, ls=":")
-    sector.set_zorder(3)
+    sector = Wedge((pose.x, pose.y), pose.far, *ends, fill=False)
+    sector.set(edgecolor=VIEW_EDGE, linewidth=0.8, linestyle=":", zorder=3)
     axes.add_patch(sector)
     camera = {"range": (0.0, pose.far), "angle_deg": pose.angle_deg}
     heading = float(np.deg2rad(pose.heading_deg))
-    region = field_of_view(SightWalls.of(Home(plan)), np.array([pose.x, pose.y]), heading, camera)
+    eye = np.array([pose.x, pose.y])
+    region = field_of_view(SightWalls.of(Home(plan)), eye, heading, camera)
     draw_region(outlines_of(region), axes)
     _draw_robot(pose, axes)
 

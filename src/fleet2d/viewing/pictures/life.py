@@ -259,7 +259,7 @@ def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
         legs = _legs_between(np.stack([path.x, path.y], axis=1), path.away)
         if len(legs) <= LEGS:
             return legs, ""
-        moving = np.flatnonzero(np.diff(path.x).astype(bool) | np.diff(path.y).astype(bool))
+        moving = np.flatnonzero((np.diff(path.x) != 0) | (np.diff(path.y) != 0))
         minutes = max(1, round(int(moving[LEGS]) * step_us / 6e7))
         return legs[:LEGS], f"only the ways of the first {minutes} min are drawn"
     # The end of a leg that was interrupted is only planned, and left out.
@@ -401,10 +401,10 @@ def draw_presence(plan: FloorPlan, trace: BodyTrace, axes: Axes) -> None:
 
 def samples_by_cell(lattice: Lattice, xy: F64) -> F64:
     """Return the number of positions, float64 (n, 2) [m], in each cell: float64 (rows, columns)."""
-    column, row = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64).T
+    cells = np.floor((xy - lattice.origin) / lattice.cell).astype(np.int64)
+    column, row = np.clip(cells, 0, (lattice.columns - 1, lattice.rows - 1)).T
     counts = np.zeros((lattice.rows, lattice.columns))
-    inside = np.clip(row, 0, lattice.rows - 1), np.clip(column, 0, lattice.columns - 1)
-    np.add.at(counts, inside, 1)
+    np.add.at(counts, (row, column), 1)
     return counts
 
 
@@ -449,17 +449,19 @@ def places_of(spots: F64) -> F64:
 def draw_sightings(places: F64, color: str, axes: Axes) -> None:
     """Draw a ring at each place where a robot saw a user."""
     style: dict[str, Any] = {"facecolors": "none", "linewidths": 0.45, "alpha": 0.6}
-    axes.scatter(places[:, 0], places[:, 1], s=7, edgecolors=color, zorder=3.5, **style)
+    x, y = places.T
+    axes.scatter(x, y, s=7, edgecolors=color, zorder=3.5, **style)
 
 
 def draw_view(view: CameraView, radius: float, axes: Axes) -> None:
     """Draw the region that a camera sees, the robot, and lines to the users in view."""
     color = view.robot.color
     draw_region(view.outlines, axes)
+    dashes: dict[str, Any] = {"color": color, "lw": 0.9, "ls": (0, (2, 1.5))}
+    ring: dict[str, Any] = {"ms": 5, "mfc": "white", "mec": color, "mew": 1.1}
     for user in view.users:
-        line = np.stack([view.xy, user], axis=1)
-        axes.plot(*line, color=color, lw=0.9, ls=(0, (2, 1.5)), zorder=4)
-        axes.plot(*user, "o", ms=5, mfc="white", mec=color, mew=1.1, zorder=4.2)
+        axes.plot(*np.stack([view.xy, user], axis=1), zorder=4, **dashes)
+        axes.plot(*user, "o", zorder=4.2, **ring)
     draw_robot(view.xy, view.heading, max(radius, 0.13), color, axes)
 
 
@@ -490,7 +492,8 @@ def draw_kept_out(areas: Iterable[Any], color: str, axes: Axes) -> None:
 
 def clear_names(plan: FloorPlan, views: Sequence[CameraView], axes: Axes) -> None:
     """Keep the names of rooms legible: with a soft outline, away from robots and users."""
-    marks = np.array([xy for view in views for xy in (view.xy, *view.users)]).reshape(-1, 2)
+    places = [xy for view in views for xy in (view.xy, *view.users)]
+    marks = np.array(places).reshape(-1, 2)
     canvas: Any = axes.figure.canvas
     pixels = axes.transData.inverted()
     for text in axes.texts:
@@ -543,7 +546,8 @@ def best_view(
         users = seen_xy[seen_at == step]
         score = region.area * (1.0 if region.area < 0.97 * sector_area else 0.3)
         if len(users):
-            score *= min(1.0, float(np.hypot(*(users - xy).T).max()) / FAR_APART_M)
+            farthest_m = float(np.hypot(*(users - xy).T).max())
+            score *= min(1.0, farthest_m / FAR_APART_M)
         view = CameraView(robot, step, xy, heading, outlines_of(region), users)
         scored.append((score, view))
     return max(scored, key=itemgetter(0))[1] if scored else None
@@ -569,7 +573,8 @@ def field_of_view(
         sector = eye.buffer(far).difference(eye.buffer(near))
     else:
         half = np.deg2rad(angle_deg) / 2
-        angles = np.linspace(heading - half, heading + half, max(3, round(half * 2 / pi * 180)))
+        corners = max(3, round(half * 2 / pi * 180))
+        angles = np.linspace(heading - half, heading + half, corners)
         arc = directions(angles)
         inner = [xy] if near == 0 else xy + near * arc[::-1]
         sector = shapely.Polygon(np.concatenate([xy + far * arc, inner]))
