@@ -162,6 +162,16 @@ def table_of_states(stays, path):
     return written(path / "history.csv", rows)
 
 
+def room_sensor(stays, path):
+    """Write what a sensor tells of Ana's room, beside one of Ben's and a light."""
+    rows = ["entity_id,state,last_changed"]
+    for begin, _, room, _ in stays:
+        rows.append(f"sensor.ana_room,{'not_home' if room == AWAY else room},{stamp(begin)}")
+        rows.append(f"sensor.ben_room,{ROOMS[0]},{stamp(begin)}")
+        rows.append(f"light.hall,on,{stamp(begin)}")
+    return written(path / "history.csv", rows)
+
+
 def database(stays, path, *, is_old=False):
     """Write the database of Home Assistant; old ones name the entity in each row."""
     file = path / "home-assistant_v2.db"
@@ -242,6 +252,7 @@ LAYOUTS = {
     "aras": (aras, {"id": "2"}),
     "openshs": (openshs, {}),
     "states": (table_of_states, {}),
+    "room sensor": (room_sensor, {"id": "sensor.ana_room"}),
     "database": (database, {"time_zone": "UTC"}),
     "old database": (old_database, {"time_zone": "UTC"}),
     "REST history": (rest_history, {"time_zone": "UTC"}),
@@ -401,6 +412,26 @@ def test_local_times_of_a_history_follow_the_time_zone_through_the_end_of_summer
     assert [r.begin_us // (60 * S) for r in log.readings] == [25 * 60 + 30, 30 * 60 + 30]
     assert log.first_day == date(2026, 10, 24)
     assert log.notes == ("left out as unavailable or unknown: 2 states",)
+
+
+def test_sensors_whose_states_are_rooms_are_named_where_no_id_chooses_one(tmp_path):
+    """Ana was nowhere all day: the rooms of her phone were left out, as neither on nor off."""
+    rows = ["entity_id,state,last_changed", "sensor.ana_room,kitchen,2026-03-02 08:00:00"]
+    path = written(tmp_path / "history.csv", [*rows, "person.ana,home,2026-03-02 08:00:00"])
+
+    words = r"it has sensor\.ana_room: if one tells the room of a person, name it by id"
+    with pytest.raises(LogError, match=words):
+        read_log(path)
+
+
+def test_a_stay_that_a_sensor_tells_lasts_until_the_end_of_the_log_days_later(tmp_path):
+    rows = ["entity_id,state,last_changed", "sensor.ana_room,kitchen,2026-03-02 08:00:00"]
+    path = written(tmp_path / "history.csv", [*rows, "light.hall,on,2026-03-04 09:00:00"])
+
+    readings = read_log(path, id="sensor.ana_room").readings
+
+    assert ["kitchen"] * 3 == [reading.room for reading in readings]
+    assert (8 * 3600 * S, 57 * 3600 * S) == (readings[0].begin_us, readings[-1].end_us)
 
 
 def test_a_database_of_something_else_is_refused(tmp_path):

@@ -5,6 +5,7 @@
     entity_id,state,last_changed
     binary_sensor.kitchen_motion,on,2026-03-28T23:30:00.123Z
     person.ana,not_home,2026-03-29T07:02:11.000Z
+    sensor.ana_room,kitchen,2026-03-29T16:20:45.000Z
 
 Home Assistant's recorder is a database, `home-assistant_v2.db`, which is read as it is, and so is
 the history that its APIs answer.
@@ -16,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from datetime import datetime
 from datetime import time as clock
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -34,6 +36,7 @@ from fleet2d.logs.log import (
     log_lines,
     parse_time,
 )
+from fleet2d.runtime.clock import DAY_US
 from fleet2d.runtime.local_time import Zone, rules_of, wall_us
 
 _ENTITIES = ("entity_id", "entity", "device", "sensor", "name", "item")
@@ -74,11 +77,12 @@ def read_states(
     """Read the states of a home: what switches on shows that somebody is there at that instant.
 
     Labels are the areas that a table has, else the entities. While a person is not at home, by a
-    `person` or `device_tracker`, it is away.
+    `person` or `device_tracker`, it is away. A sensor that tells a person's room, as ESPresense
+    and Bermuda make them of phones, is named by `id`: then its states are the labels.
 
     Args:
         path: The table, or the database.
-        id: The person's entity, if there are several.
+        id: The person's entity, if there are several, or the sensor that tells its room.
         time_zone: The time zone of the home, if times have an offset or are of a database.
         zone: The clock of a home whose days have 23 or 25 hours, too.
         sort: Put rows in order of time.
@@ -92,11 +96,36 @@ def read_states(
     states = list(_local(path, rows, zone or time_zone))
     if not states:
         raise LogError(f"{path} holds no reading: is it the right file?")
-    person = _person(path, {s.entity for s in states}, id)
+    entities = {state.entity for state in states}
+    tells_room = id in entities and not id.startswith(_PEOPLE)
+    person = None if tells_room else _person(path, entities, id)
     states = _in_order(path, states, "line" if read is _table else "state", sort=sort)
     first_midnight = datetime.combine(min(state.time for state in states).date(), clock.min)
     begin = first_midnight if zone is None else zone.at(first_midnight)
     first_day = min(state.time for state in states).date()
+    if tells_room:
+        readings = _stays(states, str(id), begin)
+        others: Counter[str] = Counter()
+    else:
+        readings, others = _shown(states, person, begin)
+    gone = others.pop("unavailable", 0)
+    names = one_line(", ".join(sorted(others)[:5]), 200)
+    advice = "if one tells the room of a person, name it by id"
+    if others and not readings:
+        raise LogError(f"{path}: nothing switches on; it has {names}: {advice}")
+    readings, notes = in_order(readings, path, sort=sort)
+    if gone:
+        notes.append(f"left out as unavailable or unknown: {counted(gone, 'state')}")
+    if others:
+        left = counted(others.total(), "state")
+        notes.append(f"left out as neither on nor off: {left} of {names}; {advice}")
+    return ActivityLog(path, "states", first_day, tuple(readings), tuple(notes))
+
+
+def _shown(
+    states: list[_StateLine], person: str | None, begin: datetime
+) -> tuple[list[Reading], Counter[str]]:
+    """Return what switching on and being away show, and how many states of an entity do neither."""
     readings: list[Reading] = []
     others: Counter[str] = Counter()
     absence: int | None = None  # the reading of being away that isn't over
@@ -115,14 +144,23 @@ def read_states(
             readings.append(Reading(at, at, state.area or state.entity, "", state.line))
         elif word not in _OFF:
             others["unavailable" if word in _UNKNOWN else state.entity] += 1
-    readings, notes = in_order(readings, path, sort=sort)
-    if gone := others.pop("unavailable", 0):
-        notes.append(f"left out as unavailable or unknown: {counted(gone, 'state')}")
-    if others:
-        names = one_line(", ".join(sorted(others)[:5]), 200)
-        left = counted(others.total(), "state")
-        notes.append(f"left out as neither on nor off: {left} of {names}")
-    return ActivityLog(path, "states", first_day, tuple(readings), tuple(notes))
+    return readings, others
+
+
+def _stays(states: list[_StateLine], sensor: str, begin: datetime) -> list[Reading]:
+    """Return the stays of a person whose room a sensor tells; the last one ends with the log."""
+    told = [state for state in states if state.entity == sensor]
+    readings = []
+    for state, following in pairwise([*told, states[-1]]):
+        room = state.state.strip()
+        label = AWAY if room.lower() in _OUT else room
+        at = micros(state.time - begin)
+        end = micros(following.time - begin)
+        if room.lower() not in _UNKNOWN:
+            # A reading lasts a day at most.
+            parts = range(at, max(end, at + 1), DAY_US)
+            readings += [Reading(t, min(end, t + DAY_US), label, "", state.line) for t in parts]
+    return readings
 
 
 def _in_order(path: Path, states: list[_StateLine], noun: str, *, sort: bool) -> list[_StateLine]:
