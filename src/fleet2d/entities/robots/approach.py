@@ -307,11 +307,13 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
     reach = distance * lattice.units_per_m
     if route is None or _distance(person, position) <= reach:
         return position
-    for start, end, length in zip(route[:-1], route[1:], _legs(route), strict=True):
+    for start, end in pairwise(route.tolist()):
+        length = _distance(start, end)
         if _distance(person, start) - length > reach + 2:  # rounded points are a little off the leg
             continue
         steps = max(1, int(length / (lattice.units_per_m / 20)))
-        points = start + (end - start) * np.arange(1, steps + 1)[:, None] // steps
+        leg = np.subtract(end, start)
+        points = start + leg * np.arange(1, steps + 1)[:, None] // steps
         gaps = points - person
         is_near = np.sqrt((gaps * gaps).sum(axis=1).astype(np.float64)) <= reach
         for x_at, y_at in points[is_near].tolist():
@@ -375,10 +377,10 @@ def check_has_camera(actor: Actor, behavior: str) -> None:
 def _legs(route: I64) -> list[float]:
     """Return the lengths of the legs of a route [lattice]."""
     # A route has few legs: numbers of Python are faster than arrays here.
-    legs = pairwise(route.tolist())
-    return [math.sqrt((bx - ax) ** 2 + (by - ay) ** 2) for (ax, ay), (bx, by) in legs]
+    return [_distance(start, end) for start, end in pairwise(route.tolist())]
 
 
-def _distance(one: object, other: object) -> float:
-    gap = np.asarray(one, np.int64) - np.asarray(other, np.int64)
-    return float(np.sqrt(np.float64((gap * gap).sum())))
+def _distance(one: Sequence[int], other: Sequence[int]) -> float:
+    dx = other[0] - one[0]
+    dy = other[1] - one[1]
+    return math.sqrt(dx * dx + dy * dy)

@@ -238,8 +238,10 @@ class Interact(BeliefBehavior):
     def _take_served(self, now: Situation) -> ServedRequest | None:
         """Return and forget what it is doing; None if another behavior has interrupted that."""
         served = self.served
+        if served is None:
+            return None
         self.served = None
-        if served is None or now.actor.plan.root is self.plan:
+        if now.actor.plan.root is self.plan:
             return served
         if served.step == "ask":  # maybe it was sent away
             self.left_alone[served.request.to] = now.time + self.again
