@@ -485,3 +485,14 @@ def test_real_homes_of_kasteren_are_read_whole(shared_data, home, days, absences
     assert isinstance(log, ActivityLog)
     assert (log.days, log.rooms[AWAY]) == (days, absences)
     assert {"sleeping", "take-shower", "prep-dinner"} <= {r.activity for r in log.readings}
+
+
+def test_a_person_at_work_is_away_until_home(tmp_path):
+    places = ["home", "not_home", "Work", "not_home", "home"]
+    rows = [f"person.ana,{place},2026-03-02 {8 + k:02}:00:00" for k, place in enumerate(places)]
+    path = tmp_path / "states.csv"
+    path.write_text("\n".join(["entity_id,state,last_changed", *rows]))
+
+    spans = [(r.begin_us / 3.6e9, r.end_us / 3.6e9) for r in read_log(path).readings]
+
+    assert [(9, 10), (10, 11), (11, 12)] == spans

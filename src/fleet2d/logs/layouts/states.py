@@ -51,9 +51,11 @@ HEAD = re.compile(
 """The first line of a table."""
 _ON = frozenset({"on", "open", "opened", "detected", "occupied", "motion", "present", "true", "1"})
 _OFF = frozenset({"off", "closed", "close", "clear", "false", "0", "idle", "absent", "no_motion"})
-_OUT = frozenset({"not_home", "away", "absent"})
 _PEOPLE = ("person.", "device_tracker.")
 _UNKNOWN = frozenset({"unavailable", "unknown", "none", ""})
+_OUT = frozenset({"not_home", "away", "absent"})
+# States of a person who isn't away; others are not_home and names of places, such as Work.
+_NOT_OUT = _ON | _UNKNOWN | {"home"}
 
 
 class _StateLine(NamedTuple):
@@ -133,7 +135,7 @@ def _shown(
         at = micros(state.time - begin)
         word = state.state.strip().lower()
         if state.entity.startswith(_PEOPLE):
-            is_out = word in _OUT and state.entity == person
+            is_out = word not in _NOT_OUT and state.entity == person
             if absence is not None and state.entity == person:
                 readings[absence] = readings[absence]._replace(end_us=at)
                 absence = None
