@@ -44,7 +44,9 @@ def write(
     return path
 
 
-@pytest.mark.parametrize(("unit_m", "units"), [(1.0, 6), (0.001, 4), (0.001, 0), (0.01, 5)])
+@pytest.mark.parametrize(
+    ("unit_m", "units"), [(1.0, 6), (0.001, 4), (0.001, 0), (0.01, 5), (0.1, 14), (0.9144, 10)]
+)
 def test_walls_of_two_lines_bound_two_rooms(tmp_path, unit_m, units):
     plan = load_floorplan(write(tmp_path, unit_m, units))
 
@@ -144,3 +146,50 @@ def test_a_drawing_without_a_unit_and_doors_is_refused_with_the_sizes(tmp_path):
 
     with pytest.raises(FloorPlanError, match=r"set floorplan\.scale; 0\.01 makes it 57 m2"):
         load_floorplan(tmp_path / "plan.dxf")
+
+
+def test_layers_that_are_off_or_frozen_draw_no_walls(tmp_path):
+    path = write(tmp_path)
+    seen = load_floorplan(path)
+    drawing = ezdxf.readfile(path)
+    drawing.layers.add("WALL-OLD").off()
+    drawing.layers.add("WALL-DEMO").freeze()
+    for layer, x in (("WALL-OLD", 2), ("WALL-DEMO", 6)):
+        drawing.modelspace().add_line((x, 0), (x, 4), dxfattribs={"layer": layer})
+    drawing.saveas(path)
+
+    assert seen == load_floorplan(path)
+
+
+def test_walls_in_blocks_of_blocks_are_walls(tmp_path):
+    path = write(tmp_path)
+    area_m2 = load_floorplan(path).area_m2
+    drawing = ezdxf.readfile(path)
+    inner = drawing.blocks.new("storey")
+    outer = drawing.blocks.new("house")
+    for entity in list(drawing.modelspace()):
+        drawing.modelspace().move_to_layout(entity, inner)
+    outer.add_blockref("storey", (1, 1), dxfattribs={"rotation": 90})
+    drawing.modelspace().add_blockref("house", (3, 0), dxfattribs={"xscale": -1})
+    drawing.saveas(path)
+
+    assert load_floorplan(path).area_m2 == pytest.approx(area_m2, abs=0.05)
+
+
+@pytest.mark.parametrize("unit_m", [1.0, 0.001])
+@pytest.mark.parametrize("kind", ["circle", "bulges"])
+def test_a_round_column_is_wall(tmp_path, unit_m, kind):
+    path = write(tmp_path, unit_m, {1.0: 6, 0.001: 4}[unit_m])
+    area_m2 = load_floorplan(path).area_m2
+    drawing = ezdxf.readfile(path)
+    x, y, radius = (length / unit_m for length in (2, 2, 0.5))
+    if kind == "circle":
+        drawing.modelspace().add_circle((x, y), radius, dxfattribs={"layer": "A-WALL"})
+    else:
+        ends = [(x - radius, y, 0, 0, 1), (x + radius, y, 0, 0, 1)]
+        drawing.modelspace().add_lwpolyline(ends, close=True, dxfattribs={"layer": "A-WALL"})
+    drawing.saveas(path)
+
+    column_m2 = area_m2 - load_floorplan(path).area_m2
+
+    assert column_m2 == pytest.approx(math.pi * 0.5**2, abs=0.05)

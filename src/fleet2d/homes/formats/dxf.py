@@ -2,7 +2,7 @@
 
 import re
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from fleet2d.homes.formats.features import Draft, Feature
 from fleet2d.kernels import F64
 
 # Metres to a unit, by the header variable $INSUNITS, and what is tried if that makes no home.
-UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0}
+UNITS_M = {1: 0.0254, 2: 0.3048, 4: 0.001, 5: 0.01, 6: 1.0, 10: 0.9144, 14: 0.1, 21: 1200 / 3937}
 TRIED_M = (1.0, 0.001, 0.01, 0.0254, 0.3048)
 # Words in the names of layers, in several languages.
 WALLS = re.compile("wall|wand|mauer|mur|pared|paret|muur", re.IGNORECASE)
@@ -33,7 +33,10 @@ OTHERS = re.compile(
     "dim|text|hatch|furn|m[öo]bel|mobil|door|t[üu]e?r|porte|puerta|axis|grid|defpoints|anno|title",
     re.IGNORECASE,
 )
-DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE")
+DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
+# What consists of other entities, and how deeply it may be nested.
+COMPOUND = ("INSERT", "MLINE")
+MAX_NESTED = 8
 # Width of a line, and of the narrowest space: what is narrower is the inside of a wall that is
 # drawn by its two sides [m].
 LINE_M = 0.02
@@ -132,7 +135,8 @@ class Dxf(FileSource):
 
     def _layers(self, drawing: Any, notes: list[str]) -> set[str]:
         """Return the names of the layers with walls."""
-        names = {str(entity.dxf.layer) for entity in drawing.modelspace()}
+        entities = _parts(drawing, drawing.modelspace(), frozenset())
+        names = {name for _, layers in entities for name in layers}
         if self.walls is not None:
             pattern = re.compile(re.escape(self.walls).replace(r"\*", ".*"), re.IGNORECASE)
             chosen = {name for name in names if pattern.fullmatch(name)}
@@ -166,17 +170,36 @@ def _lines(drawing: Any, layers: set[str]) -> Iterator[F64]:
     """Yield the corners of each line on some layers, float64 (n, 2), in units of the drawing."""
     from ezdxf.path import make_path
 
-    for entity in drawing.modelspace():
-        parts = [entity]
-        if entity.dxftype() == "INSERT":
-            parts = list(entity.virtual_entities())
-        for part in parts:
-            on_layer = {str(part.dxf.layer), str(entity.dxf.layer)} & layers
-            if on_layer and part.dxftype() in DRAWN:
-                points = [(p.x, p.y) for p in make_path(part).flattening(distance=0.01)]
-                corners = np.array(points, np.float64).reshape(-1, 2)
-                if len(corners) > 1 and np.isfinite(corners).all():
-                    yield corners
+    for part, of_part in _parts(drawing, drawing.modelspace(), frozenset()):
+        if of_part & layers and part.dxftype() in DRAWN and not _is_door(part):
+            points = [(p.x, p.y) for p in make_path(part).flattening(distance=0.01)]
+            corners = np.array(points, np.float64).reshape(-1, 2)
+            if len(corners) > 1 and np.isfinite(corners).all():
+                yield corners
+
+
+def _parts(
+    drawing: Any, entities: Iterable[Any], of_blocks: frozenset[str], depth: int = 0
+) -> Iterator[tuple[Any, frozenset[str]]]:
+    """Yield what is visible of entities and of their blocks, each with the layers that it is on."""
+    for entity in entities:
+        name = str(entity.dxf.layer)
+        layer = drawing.layers.get(name) if name in drawing.layers else None
+        if layer is not None and (layer.is_off() or layer.is_frozen()):
+            continue
+        layers = of_blocks | {name}
+        if entity.dxftype() in COMPOUND and depth < MAX_NESTED:
+            yield from _parts(drawing, entity.virtual_entities(), layers, depth + 1)
+        else:
+            yield entity, layers
+
+
+def _is_door(entity: Any) -> bool:
+    """Return whether an entity is an arc of about a quarter turn, as of a door."""
+    if entity.dxftype() != "ARC":
+        return False
+    sweep = (float(entity.dxf.end_angle) - float(entity.dxf.start_angle)) % 360
+    return DOOR_ARC_DEG[0] <= sweep <= DOOR_ARC_DEG[1]
 
 
 def _panes(lines: Sequence[F64]) -> list[Feature]:
@@ -204,15 +227,10 @@ def _clean(line: F64) -> F64:
 def _door_arcs(drawing: Any) -> F64:
     """Return the arcs of doors as their middle (x, y) and radius, float64 (n, 3), in units."""
     arcs = []
-    for entity in drawing.modelspace():
-        parts = entity.virtual_entities() if entity.dxftype() == "INSERT" else [entity]
-        for part in parts:
-            if part.dxftype() != "ARC" or WINDOWS.search(str(part.dxf.layer)):
-                continue
-            sweep = (float(part.dxf.end_angle) - float(part.dxf.start_angle)) % 360
-            if DOOR_ARC_DEG[0] <= sweep <= DOOR_ARC_DEG[1]:
-                centre = part.ocs().to_wcs(part.dxf.center)
-                arcs.append((float(centre.x), float(centre.y), float(part.dxf.radius)))
+    for part, _ in _parts(drawing, drawing.modelspace(), frozenset()):
+        if _is_door(part) and not WINDOWS.search(str(part.dxf.layer)):
+            centre = part.ocs().to_wcs(part.dxf.center)
+            arcs.append((float(centre.x), float(centre.y), float(part.dxf.radius)))
     found = np.array(arcs, np.float64).reshape(-1, 3)
     return found[np.isfinite(found).all(axis=1)]
 
@@ -282,7 +300,7 @@ def _inside(lines: list[F64], notes: list[str]) -> tuple[MultiPolygon, list[tupl
     """
     drawn = shapely.union_all([LineString(_clean(line)) for line in lines])
     thick = drawn.buffer(NARROW_M / 2, cap_style="square", join_style="mitre")
-    solid = grown(thick, -NARROW_M / 2)
+    solid = opened(grown(thick, -NARROW_M / 2), LINE_M / 2)  # not the rounding of curves
     alone = drawn.difference(solid.buffer(LINE_M / 2))
     walls = shapely.union_all([solid, grown(alone, LINE_M / 2)])
     whole = enclosed_space(walls, [], notes)
