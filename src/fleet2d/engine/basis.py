@@ -145,8 +145,30 @@ class Watcher:
         """Take in new outputs of algorithms, and new results of metrics."""
 
 
+class Cast:
+    """Base of what has the bodies of a run: users, then robots.
+
+    Attributes:
+        actors: The bodies.
+        bodies: Their poses, in the same order.
+    """
+
+    actors: list[DecidingActor]
+    bodies: Bodies
+
+    @property
+    def users(self) -> list[DecidingActor]:
+        """The users."""
+        return self.actors[: self.bodies.users]
+
+    @property
+    def robots(self) -> list[DecidingActor]:
+        """The robots."""
+        return self.actors[self.bodies.users :]
+
+
 @dataclass(frozen=True)
-class Basis:
+class Basis(Cast):
     """The scenario, home and bodies from which the parts of a run are made.
 
     Attributes:
@@ -166,16 +188,6 @@ class Basis:
     home: Home
     actors: list[DecidingActor]
     bodies: Bodies
-
-    @property
-    def users(self) -> list[DecidingActor]:
-        """The users."""
-        return self.actors[: self.bodies.users]
-
-    @property
-    def robots(self) -> list[DecidingActor]:
-        """The robots."""
-        return self.actors[self.bodies.users :]
 
     @property
     def may_change(self) -> bool:

@@ -1,11 +1,9 @@
 """The layers of a run, and the times at which they are stored."""
 
 from collections.abc import Set
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fleet2d.algorithms.algorithm import Algorithm
 from fleet2d.algorithms.history import Log
@@ -148,7 +146,7 @@ class LayerBook:
             settings = _with_storage(cells, storage or LayerSettings(store=False))
             for area in self.areas:
                 layer = f"{name}.{area.robot.name}"
-                self._home.layers.add_layer(layer, settings, _Cells(area, name))
+                self._home.layers.add_layer(layer, settings, getattr(area, name))
 
     def _period(self, layer: Layer) -> int:
         """Return the steps between two times at which a layer is stored; 0 for never."""
@@ -179,17 +177,6 @@ class LayerBook:
         }
         self._store.add_rows(f"{LAYER_PREFIX}{layer.name}", columns, layer.description)
         self._stored_at[layer.name] = step
-
-
-@dataclass(frozen=True)
-class _Cells:
-    """The values of a layer of seen cells, computed when they are read."""
-
-    area: "SeenArea"
-    name: str
-
-    def __call__(self) -> NDArray[Any]:
-        return getattr(self.area, self.name)()
 
 
 def _with_storage(cells: LayerSettings, storage: LayerSettings) -> LayerSettings:

@@ -7,7 +7,6 @@ from fleet2d.configuration.problems import check_known
 from fleet2d.engine.intervention_queue import InterventionQueue
 from fleet2d.engine.state import State
 from fleet2d.entities.decisions import DecidingActor
-from fleet2d.entities.equipment import Displacement
 from fleet2d.entities.power import EMPTY, KEPT, MAP, Power, Updates, power_of
 from fleet2d.entities.sensor import Sensor
 from fleet2d.errors import ScenarioError, errors_as
@@ -72,7 +71,9 @@ def _was_carried(actor: DecidingActor, step: int) -> bool:
     if before == after:
         return False
     if getattr(actor.entity, "localization", None) is not None:
-        actor.displacements.append(Displacement.since(step, before, after))
+        from fleet2d.interventions.robots import displaced  # few robots are carried
+
+        actor.displacements.append(displaced(step, before, after))
     return True
 
 

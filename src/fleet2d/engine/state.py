@@ -12,7 +12,7 @@ import numpy as np
 from fleet2d.algorithms.history import Log, SensorRow
 from fleet2d.algorithms.observations import SightingTable
 from fleet2d.artifacts.store import RunStore
-from fleet2d.engine.basis import Watcher
+from fleet2d.engine.basis import Cast, Watcher
 from fleet2d.engine.cameras import NOTHING, Cameras
 from fleet2d.engine.change_queue import ChangeQueue
 from fleet2d.engine.intervention_queue import InterventionQueue
@@ -175,7 +175,7 @@ def capacity_of(actors: int) -> int:
 
 
 @dataclass
-class State:
+class State(Cast):
     """The state of a run at a step.
 
     Attributes:
@@ -243,16 +243,6 @@ class State:
         self.capacity = capacity_of(len(self.actors))
         self.steering = [watcher for watcher in self.watchers if watcher.steered]
         self.listening = [watcher for watcher in self.watchers if watcher.hears_plans]
-
-    @property
-    def users(self) -> list[DecidingActor]:
-        """The users."""
-        return self.actors[: self.bodies.users]
-
-    @property
-    def robots(self) -> list[DecidingActor]:
-        """The robots."""
-        return self.actors[self.bodies.users :]
 
     def find(self, kind: type[W]) -> W | None:
         """Return the watcher of a kind; None if the run needs none."""

@@ -12,7 +12,7 @@ from fleet2d import kernels
 from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import problem_at
 from fleet2d.configuration.units import AngleDeg, Length, PositiveDuration, Share, micros
-from fleet2d.entities.body import NEVER, Body, Motion, Pose, Track
+from fleet2d.entities.body import Body, Motion, Track
 from fleet2d.entities.place import Place, stop_at
 from fleet2d.entities.plan import Note, Plan
 from fleet2d.kernels import (
@@ -23,7 +23,6 @@ from fleet2d.kernels import (
     BatteryState,
     Breakpoints,
     Window,
-    turn_between,
 )
 from fleet2d.runtime.clock import MINUTE_US
 from fleet2d.runtime.determinism import stream_key
@@ -225,12 +224,6 @@ class Displacement(NamedTuple):
     x: int
     y: int
     turn: int
-
-    @classmethod
-    def since(cls, step: int, believed: Pose, true: Pose) -> "Displacement":
-        """Return the one that begins at a step, as a robot isn't where it believes to be."""
-        turn = turn_between(true.heading, believed.heading)
-        return cls(step, NEVER, believed.x - true.x, believed.y - true.y, turn)
 
 
 class Offsets(NamedTuple):

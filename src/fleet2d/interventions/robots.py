@@ -9,7 +9,7 @@ from fleet2d.configuration.components import Settings
 from fleet2d.configuration.problems import check_known, problem, suggest
 from fleet2d.configuration.units import AngleDeg, PositiveDuration, Share
 from fleet2d.entities.behavior import Actor, Command
-from fleet2d.entities.body import NEVER
+from fleet2d.entities.body import NEVER, Pose
 from fleet2d.entities.decisions import DecidingActor
 from fleet2d.entities.equipment import Charge, Displacement
 from fleet2d.entities.place import Place
@@ -18,6 +18,7 @@ from fleet2d.errors import PlacementError, ScenarioError
 from fleet2d.floorplan.plan import Room
 from fleet2d.interventions.bodies import BodyIntervention, Put, behavior_number, heading_of
 from fleet2d.interventions.intervention import Lasting, World, body, robot, user
+from fleet2d.kernels import turn_between
 from fleet2d.runtime.events import EventKind
 from fleet2d.sight.camera import Disturbance, FalseSighting, dark_cameras
 from fleet2d.sight.perception import Perception
@@ -658,7 +659,7 @@ class Kidnap(Trouble):
         self._put.begin(world)
         if getattr(actor.entity, "localization", None) is not None:
             displacements = actor.displacements
-            moved = Displacement.since(world.step, before, actor.state)
+            moved = displaced(world.step, before, actor.state)
             last = displacements[-1] if displacements else None
             if last is not None and last.end > world.step:  # carried off again before it knew
                 displacements[-1] = last._replace(end=world.step)
@@ -670,6 +671,12 @@ class Kidnap(Trouble):
     @property
     def _put(self) -> Put:
         return Put(entity=self.entity, to=self.to)
+
+
+def displaced(step: int, believed: Pose, true: Pose) -> Displacement:
+    """Return the error of a robot that isn't where it believes to be, from a step on."""
+    turn = turn_between(true.heading, believed.heading)
+    return Displacement(step, NEVER, believed.x - true.x, believed.y - true.y, turn)
 
 
 def camera_name(camera: bool | str | None) -> str | None:
