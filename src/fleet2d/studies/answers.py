@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from fleet2d.studies.specification import PairedComparison
 
 
-MAX_P = 1 - LEVEL  # below which a difference is clear
+MAX_P = 1 - LEVEL  # a difference is clear below this p value
 NOISE = 1e-9  # shares of the variance up to here are rounding errors
 RESIDUAL = "residual"
-# The sizes of studies whose power is told, in seeds.
+# The numbers of seeds for which power is computed.
 OTHER_SIZES = (2, 3, 5, 10, 20, 30, 50, 100)
-# The same in homes; fewer tell no amounts.
+# The numbers of homes, likewise; with fewer, no interval can be trusted.
 SIZES = (ENOUGH_UNITS, 50, 100, 200, 500, 1000)
 
 
@@ -43,7 +43,7 @@ def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:
     """Check that a study has axes.
 
     Raises:
-        InputError: It has no such axis.
+        InputError: The study has no such axis.
     """
     for axis in axes:
         if axis not in columns:
@@ -51,11 +51,11 @@ def check_axes(axes: Iterable[str], columns: Sequence[str]) -> None:
 
 
 class StudyAnswers:
-    """What a study says of its metrics: the base of `Study`, which reads its variants.
+    """The answers of a study about its metrics; base class of `Study`, which reads the variants.
 
     Attributes:
         location: The folder or store, without secrets.
-        meta: Its description: name, columns, populations, comparisons.
+        meta: The description of the study: name, columns, populations, comparisons.
         columns: The columns of the axes, the seed last.
         populations: The columns whose values are a sample of a population.
     """
@@ -128,7 +128,7 @@ class StudyAnswers:
         return self.meta.limits(metric)
 
     def better(self, metric: str) -> str:
-        """Return which values of a metric are better: `higher`, `lower`, or empty: neither is."""
+        """Return which values of a metric are better: `higher`, `lower`, or empty for neither."""
         return self.meta.better(metric)
 
     def paired(
@@ -174,7 +174,7 @@ class StudyAnswers:
         by: Sequence[str] | None = None,
         within: Sequence[str] = (),
     ) -> "list[Comparison]":
-        """Return what `paired` makes rows of, as yet without corrected p values.
+        """Return the comparisons behind the rows of `paired`, before p values are corrected.
 
         Raises:
             InputError: There is no such metric, axis or value, or no pair.
@@ -323,10 +323,10 @@ class StudyAnswers:
         return group_means(frame, metric, axes, self._units(by), self.limits(metric))
 
     def shares(self, metric: str) -> "pl.DataFrame":
-        """Return the share of a metric's variance by axis, and by pairs of axes beyond both.
+        """Return the shares of a metric's variance by axis and by interaction of two axes.
 
-        The largest share comes first, what is left over last. In designs that are not balanced the
-        shares may overlap.
+        The largest share comes first, the residual last. Shares may overlap if a design isn't
+        balanced.
 
         Raises:
             InputError: There is no such metric.
@@ -343,7 +343,7 @@ class StudyAnswers:
             squares = {column: _between(frame, metric, column) for column in varying}
             rows += [(column, square / total) for column, square in squares.items()]
             for a, b in itertools.combinations(varying, 2):
-                # With one variant a cell it is the residual, no interaction.
+                # With one variant a cell, an interaction can't be told from the residual.
                 if frame.select(a, b).n_unique() < len(values):
                     joint = _between(frame, metric, a, b) - squares[a] - squares[b]
                     rows.append((f"{a} × {b}", joint / total))
@@ -423,24 +423,24 @@ def difference_limits(limits: Limits) -> Limits:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A value of an axis beside the reference: what pairs of variants say of a metric.
+    """A metric at a value of an axis and at the reference, compared over pairs of variants.
 
     Attributes:
         metric: The metric.
-        labels: The value of the compared axis, which comes first, and those of the axes within.
+        labels: The values of the compared axis, which comes first, and of the axes within.
         reference: The label of the reference.
-        better: Which values of the metric are better: `higher`, `lower`, or empty: neither is.
+        better: Which values of the metric are better: `higher`, `lower`, or empty for neither.
         mean: The mean over units.
-        reference_mean: That of the reference.
+        reference_mean: The mean of the reference over units.
         estimate: The mean difference.
         deviation: The standard deviation of the units' differences.
         variance_ratio: The variance of unpaired differences over that of paired ones.
         pairs: The number of pairs.
-        above: How many of them are above the reference.
-        below: How many of them are below it.
+        above: The number of pairs above the reference.
+        below: The number of pairs below the reference.
         units: The number of units of each kind.
         p_holm: The p value, corrected for all comparisons that are read together; see `judged`.
-        number: How many those are.
+        number: The number of comparisons that are read together.
     """
 
     metric: str
@@ -471,7 +471,7 @@ class Comparison:
 
     @property
     def level(self) -> float:
-        """The level of each interval, so that all that are read together hold in 95 %."""
+        """The level of each interval, at which all of `number` hold in 95 % of studies."""
         return 1 - MAX_P / self.number
 
     @property
@@ -490,7 +490,7 @@ class Comparison:
 
     @property
     def is_clear(self) -> bool:
-        """Whether it shows a difference: all claims of one follow from this.
+        """Whether the pairs show a difference; every claim of a difference follows from this.
 
         The corrected p value must be small enough; and if there are too few units to trust the
         mean, most pairs and most units must differ in its direction, too.
@@ -510,7 +510,7 @@ class Comparison:
 
     @property
     def outcome(self) -> str:
-        """What it says, in a word or two."""
+        """The outcome in a word or two."""
         if self.is_same:
             return "the same"
         if not self.is_clear:
@@ -531,7 +531,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """What it shows in words, or how many more replicates are needed."""
+        """The verdict in words, or how many more replicates are needed."""
         side = "above" if self.difference > 0 else "below"
         count = self.above if side == "above" else self.below
         doubt = self.estimate.doubt
@@ -587,7 +587,7 @@ def comparison(
     labels: Mapping[str, Any],
     reference: Any,
 ) -> Comparison:
-    """Return what pairs say of a metric; see `Comparison`."""
+    """Return the comparison of a metric over pairs of variants."""
     units = by_units(pairs, by, "metric", "reference_metric", "difference")
     values = units["metric"].to_numpy()
     references = units["reference_metric"].to_numpy()

@@ -52,8 +52,8 @@ def study(
     Args:
         source: A study file, or the same as a mapping.
         out: A folder, or a location like s3://bucket/study; None: studies/NAME.
-        workers: The number of worker processes; None: one per core. Of an executor of your own:
-            how many calls it gets at a time.
+        workers: The number of worker processes; None: one per core. An executor of your own gets as
+            many calls at a time.
         executor: Where they run: `local`, `serial` (in this process), or an executor of your own,
             as `concurrent.futures` defines them.
         fail_fast: End with the first variant that fails.
@@ -212,7 +212,7 @@ class FunctionJob:
     function: bytes
 
     def __call__(self, task: FunctionTask) -> tuple[bool, Any]:
-        """Return whether the function succeeded, and what it returned, pickled, or its error."""
+        """Return whether the function succeeded, with its pickled result or its error."""
         try:
             run = run_scenario(task.scenario)
             return True, pickle.dumps(self._callable(run))
@@ -221,6 +221,6 @@ class FunctionJob:
 
     @cached_property
     def _callable(self) -> Callable[[Run], Any]:
-        """The function, which a worker reads once: it may hold a lot."""
+        """The function, unpickled once a worker since it may be large."""
         function: Callable[[Run], Any] = pickle.loads(self.function)  # noqa: S301 - our own
         return function

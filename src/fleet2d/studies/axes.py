@@ -27,9 +27,9 @@ class Choice:
     """One value of an axis.
 
     Attributes:
-        labels: Its label by column; an axis has one column, a group one for each of its axes.
+        labels: Its label in each column of the axis.
         changes: (key path, value) pairs that it sets in the scenario.
-        seed: The seed of runs with it; None: that of replicates.
+        seed: The seed of its runs; None: the seeds of the replicates.
     """
 
     labels: Mapping[str, Label]
@@ -117,7 +117,7 @@ def check_count(count: Number) -> Number:
     """Return a number of values, unless it is too large for one axis.
 
     Raises:
-        PydanticCustomError: It is.
+        PydanticCustomError: The number is too large.
     """
     if count > VARIANTS.limit:
         raise problem(
@@ -355,7 +355,7 @@ class ValuesAxis(Axis):
     Attributes:
         key: The key path, or several.
         values: The values.
-        labels: What the values are called.
+        labels: The names of the values in tables.
     """
 
     key: str | tuple[str, ...]

@@ -35,7 +35,7 @@ Where = Annotated[str, typer.Argument(metavar="DIR", help="The folder or store o
 # The number of lines of a list that are printed.
 MAX_LINES = 10
 MANY_VARIANTS = 20_000
-PIVOTED = 4  # columns of a table of two kinds of units, such as homes and seeds
+PIVOTED = 4  # columns of a power table of two kinds of units, such as homes and seeds
 IDENTITY_START = 6
 """The minimum number of characters of an identity that name a variant."""
 
@@ -286,7 +286,7 @@ def _print_size(count: int) -> None:
 
 
 def _print_plan(checked: "CheckedStudy", crew: "Crew") -> None:
-    """Print the axes, the first variants, how much all of them are, and what they can tell."""
+    """Print the axes, the first variants, the cost of all variants, and what they can tell."""
     from fleet2d.studies.pilot import Pilot
     from fleet2d.studies.plan import check_setups
     from fleet2d.studies.sentences import in_words

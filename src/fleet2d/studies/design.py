@@ -84,7 +84,7 @@ def scenario_content(scenario: Scenario) -> dict[str, Any]:
 
 
 def content_hash(content: Any) -> str:
-    """Return a hash of plain data. The order of keys counts: users decide in theirs.
+    """Return a hash of plain data. The order of keys counts, since users decide in that order.
 
     >>> content_hash({"a": 1, "b": 2}) == content_hash({"b": 2, "a": 1})
     False
@@ -142,7 +142,7 @@ class AxisPlan(NamedTuple):
     Attributes:
         name: Its name.
         columns: The columns that it fills.
-        when: Condition on the columns of earlier axes under which it applies.
+        when: The condition on columns of earlier axes under which the axis applies.
         choices: Its choices, in order.
         changes: The scenario change of each choice, with the place that messages name.
     """
@@ -168,7 +168,7 @@ class LifeChanges(LazySequence[Document]):
 
     Attributes:
         lives: The lives.
-        place: What messages name.
+        place: The axis and the place of it that messages name.
     """
 
     lives: FleetLives
@@ -447,7 +447,7 @@ def _with_lives(axis: AxisPlan, lives: FleetLives, rollout: Rollout | None) -> A
 
 
 def _axis_plan(specification: Specification, name: str) -> AxisPlan:
-    """Return an axis; of a population, with the first life that may turn out to be left out."""
+    """Return the plan of an axis; of a population, with the first life only, kept or not."""
     axis = specification.file.axes[name]
     place = specification.places.place(("axes", name))
     words = ", ".join(filter(None, (f"axis {name!r}", place)))
@@ -509,7 +509,7 @@ def _check_values(specification: Specification, design: Design) -> None:
 
 
 def _check_combinations(specification: Specification, design: Design) -> None:
-    """Refuse conditions on values that no variant has at once, likewise.
+    """Refuse conditions on values that no variant has at once: they would never hold, either.
 
     Raises:
         ScenarioError: There is such a condition.

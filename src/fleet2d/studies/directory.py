@@ -36,7 +36,7 @@ PLAN_ONLY = ("identity", "template", "home_key")
 
 @dataclass(frozen=True)
 class Counts:
-    """How far a study is.
+    """The progress of a study, in variants.
 
     Attributes:
         total: The number of its variants.
@@ -62,14 +62,14 @@ class Counts:
 
 
 class MetricFacts(BaseModel):
-    """What readers should know of a metric.
+    """The description of a metric for readers.
 
     Attributes:
         description: What it measures, in one line.
         unit: The unit of its numbers.
-        units: The units of those that differ, by the last part of their names.
-        least: Their least values by the last part of their names, "" for all others.
-        largest: Their largest values, likewise.
+        units: The units of numbers with another one, by the last part of their names.
+        least: The least values of numbers by the last part of their names; "" is for all others.
+        largest: The largest values, likewise.
         better: Which of two values is better, `higher` or `lower`, by the same names.
     """
 
@@ -135,12 +135,12 @@ class Meta(BaseModel):
         return limits_of(*self._facts(metric))
 
     def better(self, metric: str) -> str:
-        """Return which values of a metric are better, `higher` or `lower`; empty: neither is."""
+        """Return which values of a metric are better: `higher`, `lower`, or empty for neither."""
         facts, last = self._facts(metric)
         return facts.better.get(last, facts.better.get("", ""))
 
     def _facts(self, metric: str) -> tuple[MetricFacts, str]:
-        """Return what readers should know of a metric, and the last part of its name."""
+        """Return the facts of a metric, and the last part of its name."""
         names = metric.split(".")
         return self.metrics.get(names[0], MetricFacts()), names[-1]
 
@@ -177,7 +177,7 @@ class StudyDirectory:
         """Refuse a folder that holds something else.
 
         Raises:
-            RunDirectoryError: It isn't empty, and holds no study.
+            RunDirectoryError: The folder isn't empty, and holds no study.
         """
         folder = self.storage.folder
         if folder is None or not folder.exists() or self.exists():
@@ -236,7 +236,7 @@ class StudyDirectory:
         return frame
 
     def counts(self) -> Counts:
-        """Return how far the study is."""
+        """Count the variants by status."""
         return Counts.of(self.variants())
 
     def scenario(self, number: int) -> dict[str, Any]:
@@ -263,7 +263,7 @@ class StudyDirectory:
     def variants(self) -> "pl.DataFrame":
         """Return parameters, status, times, digest and metrics of all variants.
 
-        They are in the order of the design.
+        Rows are in the order of the design.
 
         Raises:
             RunDirectoryError: Files are missing or damaged.
@@ -280,7 +280,7 @@ class StudyDirectory:
 
         with self.storage.parquet(PLAN) as file:
             names = [name for name in file.schema_arrow.names if name not in PLAN_ONLY]
-            for number in range(file.num_row_groups):  # as `write_plan` made them
+            for number in range(file.num_row_groups):  # a slice is a row group of `write_plan`
                 yield self._with_results(pl.from_arrow(file.read_row_group(number, names)))
 
     def _with_results(self, plan: "pl.DataFrame") -> "pl.DataFrame":

@@ -92,7 +92,7 @@ class StudyJob:
         """Return the scenario of a variant.
 
         Raises:
-            Fleet2DError: It is wrong, or not as it was planned, since a file changed.
+            Fleet2DError: The scenario is wrong, or a file changed since it was planned.
         """
         scenario = self.design.scenario(task.index)
         content = scenario_content(scenario)
@@ -103,7 +103,7 @@ class StudyJob:
 
 
 class Observer:
-    """Base class of those that follow the progress of a study; it ignores everything."""
+    """Base class of observers of a study's progress; it ignores everything."""
 
     def on_note(self, text: str) -> None:
         """Receive a remark for the user."""
@@ -126,7 +126,7 @@ class CheckedStudy:
         specification: The study.
         plan: Its variants.
         scenarios: Their scenarios, as the content of a file.
-        metrics: What readers should know of their metrics, by name.
+        metrics: The facts of their metrics, by name.
     """
 
     specification: Specification
@@ -138,7 +138,7 @@ class CheckedStudy:
         """Note which metrics that the study names are missing in complete variants.
 
         Args:
-            variants: What `presence` returns of them.
+            variants: The `presence` of all variants.
             observer: Receives the notes.
         """
         import polars as pl
@@ -349,8 +349,8 @@ def _features(checked: CheckedStudy) -> tuple[str, ...]:
 
 
 def _write_plan(directory: StudyDirectory, checked: CheckedStudy, plan: StudyPlan) -> None:
-    """Write the description of the study; its `study.json` last, which makes the folder a study."""
-    directory.storage.delete(VARIANTS)  # it may belong to another plan
+    """Write the files that describe a study; the last, `study.json`, makes the folder a study."""
+    directory.storage.delete(VARIANTS)  # those stored may belong to another plan
     checked.scenarios.write(directory)
     write_plan(directory, plan)
     directory.write_meta(describe(checked))

@@ -31,10 +31,10 @@ from typing import Any, NamedTuple, Protocol
 from fleet2d.errors import ComponentError, InputError
 from fleet2d.runtime.memory import keep_free_memory, peak_memory_mb, rare_collections
 
-# How often a task is tried whose worker dies each time.
+# The number of attempts at a task whose worker dies each time.
 MAX_ATTEMPTS = 3
 MAX_BATCH = 100  # tasks that a worker gets at once
-BATCH_S = 1.0  # after which a worker returns the results of its tasks so far
+BATCH_S = 1.0  # time after which a worker returns its results so far
 MEMORY_SHARE = 0.8  # share of the machine's memory that all workers may use together
 
 
@@ -46,7 +46,7 @@ class WorkerTask:
         number: Its number in results.
         index: Its index in the design.
         identity: Its identity when it was planned.
-        home: The same for variants that can share a home.
+        home: A key that variants share if they can share a home.
     """
 
     number: int
@@ -108,13 +108,13 @@ class TaskQueue:
         return taken
 
     def put_back(self, tasks: Collection[WorkerTask]) -> None:
-        """Return tasks that were taken together: they are next."""
+        """Put tasks that were taken together back at the front of the queue."""
         if tasks:
             self._groups.appendleft((len(tasks), iter(tasks)))
             self._waiting += len(tasks)
 
     def put_back_alone(self, task: WorkerTask) -> None:
-        """Return a task whose worker died, maybe by it: it is taken without others."""
+        """Put back a task that may have killed its worker: it is taken without others."""
         self._alone.append(task)
 
 
@@ -123,9 +123,9 @@ class TaskEnd(NamedTuple):
 
     Attributes:
         task: The task.
-        attempts: How often it was run.
-        payload: Its results; None if it is lost.
-        loss: Why it has none: its worker died in each attempt. None if it has results.
+        attempts: The number of times it was run.
+        payload: Its results; None if the task is lost.
+        loss: The reason if its worker died in each attempt; None if there are results.
     """
 
     task: Any
@@ -136,12 +136,13 @@ class TaskEnd(NamedTuple):
 
 @dataclass(frozen=True)
 class Crew:
-    """An executor, and how it is used.
+    """An executor and the settings of its calls.
 
     Attributes:
         executor: The executor.
         workers: How many calls it gets at a time.
-        batch_s: After how long a call returns the results so far; the rest is called again.
+        batch_s: The time after which a call returns its results so far [s]; further calls do the
+            rest.
         plans: A folder for the homes that workers build, each once; None: each worker builds its
             own.
     """
@@ -155,8 +156,8 @@ class Crew:
 def run_tasks(crew: Crew, job: WorkerJob, queue: TaskQueue) -> Generator[list[TaskEnd]]:
     """Yield tasks that have ended, some at a time, or none after a while.
 
-    Tasks of a call that failed, as a worker died, are called again, each alone. Closing the
-    iterator cancels what has not begun.
+    If a worker dies, the tasks of its call are called again, each alone. Closing the iterator
+    cancels calls that have not begun.
 
     Raises:
         InputError: Workers can't be set up.
@@ -218,13 +219,13 @@ def _ends(
 def run_batch(
     content: bytes, tasks: Sequence[WorkerTask], seconds: float, plans: Path | None
 ) -> list[Any]:
-    """Do some tasks in a worker; return the results of those done after some seconds, one at least.
+    """Do tasks in a worker until the time is over; return their results, one at least.
 
     Args:
         content: The job, pickled.
         tasks: The tasks.
-        seconds: After how long none is begun.
-        plans: The folder for homes, as of a crew.
+        seconds: The time after which no task is begun.
+        plans: The folder for homes, as in `Crew`.
 
     Raises:
         InputError: The job can't be loaded.
@@ -251,7 +252,7 @@ def _loaded(content: bytes) -> WorkerJob:
         InputError: It can't be loaded.
     """
     try:
-        with rare_collections():  # of the modules that the job needs
+        with rare_collections():  # the job imports many modules
             job: WorkerJob = pickle.loads(content)  # noqa: S301 - from our own driver
     except Exception as error:
         raise InputError(f"a worker can't be set up:\n{traceback.format_exc()}") from error
@@ -262,14 +263,14 @@ class SerialExecutor(Executor):
     """Calls functions in this process, one after the other: for debuggers and profilers."""
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Call a function; return its result in a future. Errors go through."""
+        """Call a function; return its result in a future. An error is raised here."""
         future: Future[Any] = Future()
         future.set_result(function(*args, **kwargs))
         return future
 
 
 class LocalExecutor(ThreadPoolExecutor):
-    """Calls functions in worker processes on this machine, for each of which a thread waits.
+    """Calls functions in worker processes on this machine, each with a thread that waits for it.
 
     Each process has a pipe of its own. A `ProcessPoolExecutor` would share one among all, and wait
     for ever for a worker that was killed while it sent its results.
@@ -277,7 +278,7 @@ class LocalExecutor(ThreadPoolExecutor):
     Args:
         workers: The number of processes.
         memory_mb: Memory beyond which a process is replaced between two calls [MB]; None: an equal
-            share of 80 % of the machine's memory among the processes that there are.
+            share of 80 % of the machine's memory.
     """
 
     def __init__(self, workers: int, memory_mb: float | None = None) -> None:
@@ -290,7 +291,7 @@ class LocalExecutor(ThreadPoolExecutor):
         self._idle: list[_WorkerProcess] = []
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Call a function in a worker process; an error of the future says that it died."""
+        """Call a function in a worker process; the future raises an error if the process dies."""
         return super().submit(self._call, function, *args, **kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -327,7 +328,7 @@ class LocalExecutor(ThreadPoolExecutor):
 
     def _end(self, process: "_WorkerProcess") -> None:
         process.kill()
-        with self._lock, suppress(ValueError):  # closed meanwhile
+        with self._lock, suppress(ValueError):  # another thread may have closed it
             self._processes.remove(process)
 
 
@@ -340,17 +341,17 @@ class _WorkerProcess:
         self._process = context.Process(target=_work, args=(other_end,))
         with _worker_environment():
             self._process.start()
-        other_end.close()  # the end of the process ends the pipe
+        other_end.close()  # so that the pipe ends with the process
         self._is_ready = False
 
     @property
     def cause(self) -> str:
-        """Why a process that was killed had ended before."""
+        """The signal or exit code with which the process ended."""
         code = self._process.exitcode
         return f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
 
     def call(self, function: Callable[..., Any], args: Any, kwargs: Any) -> tuple[bool, Any, float]:
-        """Call a function: whether it returned, what it returned or raised, and the memory [MB].
+        """Call a function; return whether it succeeded, its result or error, and the memory [MB].
 
         Raises:
             EOFError: The process has ended.

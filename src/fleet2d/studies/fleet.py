@@ -1,7 +1,7 @@
-"""What a study says of a fleet: percentiles over robots, the worst of them, and groups that differ.
+"""Answers about a fleet: percentiles over robots, the worst robots, and groups that differ.
 
-Groups are found by a shallow tree on half of the homes, and tested on the others, which didn't
-choose them: so their intervals hold, and a split is told only if the others show it, too.
+Groups are found by a shallow tree on half of the homes and tested on the other half, which had no
+part in choosing them: so their intervals hold, and only splits that both halves show are reported.
 """
 
 import math
@@ -27,17 +27,17 @@ if TYPE_CHECKING:
 PERCENTS = (1, 5, 25, 50, 75, 95, 99)
 WORST_SHARE = 0.01
 DEPTH = 2
-# The number of places at which a number may be cut.
+# The number of values at which a numeric feature may be split.
 CUTS = 15
-# The share of the robots that a group has at least.
+# The least share of the robots in a group.
 SMALLEST_SHARE = 0.05
 MAX_NAMED = 3  # runs that a sentence names
-# The number of robots that two groups in each half of the homes need.
+# The number of robots for which each half of the homes can show two groups.
 FEWEST = 4 * ENOUGH_UNITS
 
 
 def features_of(study: StudyAnswers) -> list[str]:
-    """Return the columns of what was drawn for each robot, that differ."""
+    """Return the columns of drawn features that differ between robots."""
     *drawn, seed = study.meta.features
     varying = [c for c in drawn if study.complete[c].drop_nulls().n_unique() > 1]
     return [c for c in varying if c not in (*study.populations, seed)]
@@ -144,8 +144,8 @@ class GroupCondition:
     Attributes:
         feature: The feature.
         value: The value, or the limit of a number.
-        is_number: Whether it is one.
-        is_met: Whether the condition is to be met.
+        is_number: Whether the value is the limit of a number.
+        is_met: Whether robots must meet the condition, rather than break it.
     """
 
     feature: str
@@ -160,7 +160,7 @@ class GroupCondition:
         return f"{self.feature} {'is' if self.is_met else 'is not'} {self.value}"
 
     def holds(self, columns: Mapping[str, Sequence[Any]]) -> Bool:
-        """Return for each robot whether it holds: bool (robots,)."""
+        """Return for each robot whether the condition holds: bool (robots,)."""
         values = columns[self.feature]
         if self.is_number:
             numbers = np.array([math.nan if v is None else v for v in values], np.float64)
@@ -179,9 +179,9 @@ class Group:
 
     Attributes:
         conditions: What they have in common.
-        robots: Their number in the half that tests.
-        estimate: Their mean there.
-        p: The p value of the split that made it, corrected for all splits.
+        robots: Their number in the half of the homes that tests.
+        estimate: The mean over these robots.
+        p: The p value of the split that made the group, corrected for all splits.
         low: The lower end of the interval of the mean, simultaneous over all groups.
         high: Its upper end.
     """
@@ -274,7 +274,7 @@ def _best(
 
 
 def _candidates(columns: Mapping[str, Sequence[Any]], inside: Bool) -> list[GroupCondition]:
-    """Return all conditions that may divide robots, at most so many of each feature."""
+    """Return the conditions that may divide robots, at most `CUTS` of each numeric feature."""
     found = []
     for feature, values in columns.items():
         known = [value for value in compress(values, inside) if value is not None]
@@ -292,7 +292,7 @@ def _candidates(columns: Mapping[str, Sequence[Any]], inside: Bool) -> list[Grou
 def _p_of_split(values: F64, met: Bool, homes: I64) -> float:
     """Return the p value of a difference of means between robots, some of which share a home.
 
-    The standard error is that over homes; NaN if the difference can't be told.
+    The standard error is taken over homes; NaN if there are too few homes or no variance.
 
     Args:
         values: float64 (robots,).
@@ -352,7 +352,7 @@ def groups(
 
 
 def with_fleet(study: StudyAnswers, answer: Conclusion) -> Conclusion:
-    """Return the answer of a study with what it says of its fleet."""
+    """Return the answer of a study, extended by the answers about its fleet."""
     if not study.meta.fleet or not study.counts.complete:
         return answer
     compared = next(iter(StudyAnswer(study).asked), None)

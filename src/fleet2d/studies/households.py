@@ -30,7 +30,7 @@ def members_of(household: Any) -> dict[str, Any]:
 
 
 def personas_of(household: Any) -> list[str]:
-    """Return what tells the people of a household: their personas, logs, or types."""
+    """Return a word for each member of a household: persona, log or type."""
     return [_persona_of(name, user) for name, user in members_of(household).items()]
 
 

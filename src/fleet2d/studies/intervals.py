@@ -8,9 +8,9 @@ sides; the wider one contains that of rare large values too often.
 The standard error is that of a random-effects analysis of variance of crossed units, with the
 degrees of freedom of Satterthwaite (1946, Biometrics Bulletin 2).
 
-Where there are too few units to trust an interval, the estimate has a doubt. What few units do tell
-is whether most of them are above zero: by the sign test, which is exact.
-`benchmarks/intervals.py` measures how often intervals contain the true mean.
+Where there are too few units to trust an interval, the estimate has a doubt. Few units still tell
+whether most of them are above zero, by the exact sign test. `benchmarks/intervals.py` measures how
+often intervals contain the true mean.
 """
 
 import math
@@ -28,12 +28,12 @@ from fleet2d.runtime.determinism import sum_in_order
 LEVEL = 0.95
 POWER = 0.8
 MAX_NEEDED_UNITS = 10_000  # units of a level
-RARE = 0.1  # share of a kind of units that a study must not miss
-ENOUGH_UNITS = math.ceil(math.log(1 - LEVEL) / math.log(1 - RARE))  # that 95 % of studies don't
-MINOR = 0.1  # share of the variance of the mean up to which few units of a further level do
+RARE = 0.1  # the share of a rare kind of units that a study should include
+ENOUGH_UNITS = math.ceil(math.log(1 - LEVEL) / math.log(1 - RARE))  # include it in 95 %
+MINOR = 0.1  # a level with a smaller share of the variance of the mean may have few units
 ROUNDING = 1e-9  # differences up to here, relative to the values, are rounding errors
 MIN_FREEDOM = 2.0  # below which the skewness of units can't be estimated
-# The weight of the wider one of the ends of Hall and of Student's t.
+# The weight of the wider of the two ends, that of Hall and that of Student's t.
 WIDER = 0.75
 MIN_SKEWNESS = 1e-6  # below which Hall's transformation is the identity
 
@@ -50,7 +50,7 @@ class Spread:
     Attributes:
         units: The number of units of each level, such as homes.
         components: The variance between the units of a level.
-        residual: The variance of a single value beyond that.
+        residual: The residual variance of a single value.
         values: The number of values.
     """
 
@@ -102,7 +102,7 @@ class Spread:
             kind: The level whose units are counted, such as `home`.
             power: The share of such studies in which the interval excludes zero.
             level: The level of that interval.
-            units: The number of units of other kinds, if they are to differ from the present.
+            units: The number of units of other kinds, where it isn't the present one.
         """
         others = {**self.units, **(units or {})}
 
@@ -145,11 +145,11 @@ class MeanEstimate:
 
     @property
     def high(self) -> float:
-        """The upper end."""
+        """The upper end of the 95 % interval; NaN likewise."""
         return self.interval()[1]
 
     def interval(self, level: float = LEVEL) -> Limits:
-        """Return the interval that contains the true mean in a share of studies."""
+        """Return the interval that contains the true mean in a share `level` of studies."""
         if not self.error > 0:
             return math.nan, math.nan
         quantile = student_quantile(self.freedom, level)
@@ -198,7 +198,7 @@ class MeanEstimate:
             level: The level of the interval that would exclude zero.
         """
         if self.error == 0:
-            # Of the sign test: so many units of the same sign are rarer by chance.
+            # The fewest units whose equal signs are significant in the sign test.
             fewest = math.floor(2 - math.log2(1 - level))
             return dict.fromkeys(self.spread.units, fewest) if self.mean else {}
         found = {}
@@ -259,14 +259,14 @@ def estimate(
 
 
 def two_sample_interval(first: F64, second: F64, level: float = LEVEL) -> Limits:
-    """Return the interval of a difference of two means of independent samples, of Welch and Hall.
+    """Return the interval of the difference of two independent means, by Welch and Hall.
 
-    Each end is the wider of those with and without Hall's transformation, as its skewness is most
-    uncertain far out.
+    Each end is the wider of those with and without Hall's transformation, as the estimate of the
+    skewness is least certain in the tails.
 
     Args:
         first: The first sample: float64 (n,).
-        second: The other one: float64 (m,).
+        second: The second sample: float64 (m,).
         level: The share of such intervals that contain the true difference.
     """
     sides = (first, second)
@@ -285,7 +285,7 @@ def two_sample_interval(first: F64, second: F64, level: float = LEVEL) -> Limits
 
 
 def satterthwaite(variances: Sequence[float], freedoms: Sequence[float]) -> float:
-    """Return the degrees of freedom of the sum of variances that have these."""
+    """Return the degrees of freedom of a sum of variances with `freedoms` of their own."""
     parts = zip(variances, freedoms, strict=True)
     squares = sum_in_order(variance**2 / freedom for variance, freedom in parts)
     return sum_in_order(variances) ** 2 / squares
@@ -299,7 +299,7 @@ def _signs(data: F64, numbers: I64) -> tuple[int, int]:
 
 
 def _few(spread: Spread, variance: float) -> dict[str, str]:
-    """Return the levels whose units may lack a kind of them, and why they can't be trusted."""
+    """Return the levels with too few units to include rare kinds, each with its doubt in words."""
     reasons = {}
     for number, (level, count) in enumerate(spread.units.items()):
         share = spread.components[level] / count / variance
@@ -324,7 +324,7 @@ def plural(kind: str) -> str:
 def _reach(quantile: float, skewness: float) -> float:
     """Return how many standard errors below the mean an interval ends.
 
-    Above it that is so for the opposite skewness.
+    The upper end is as far above the mean for the opposite skewness.
     """
     by_hall = _inverse(quantile, skewness)
     weight = WIDER if by_hall > quantile else 1 - WIDER
@@ -332,7 +332,7 @@ def _reach(quantile: float, skewness: float) -> float:
 
 
 def _quantile_of(reach: float, skewness: float) -> float:
-    """Return the quantile whose interval ends that many standard errors below the mean.
+    """Return the quantile whose interval ends `reach` standard errors below the mean.
 
     With u = 1 + skewness / 3 * _inverse(quantile) this is the cubic u³ + 3 a u = k, which has one
     solution.

@@ -19,13 +19,13 @@ class LazySequence(Sequence[Item]):
     @overload
     def __getitem__(self, index: slice) -> list[Item]: ...
     def __getitem__(self, index: int | slice) -> Item | list[Item]:
-        """Return an item, or those of a slice."""
+        """Return an item, or the items of a slice."""
         if isinstance(index, slice):
             return [self.item(i) for i in range(*index.indices(len(self)))]
         last, item = self.__dict__.get("_last", (None, None))
         if last != index:
             item = self.item(index)
-            self.__dict__["_last"] = index, item  # also of those that are frozen
+            self.__dict__["_last"] = index, item  # subclasses may be frozen
         return item
 
     def __getstate__(self) -> dict[str, Any]:

@@ -58,7 +58,7 @@ MAX_PROGRAMS = 200
 
 
 class HomeFeatures(NamedTuple):
-    """What conditions ask of a home.
+    """The features of a home that conditions may ask for.
 
     Attributes:
         rooms: The number of its rooms.
@@ -74,7 +74,7 @@ class HomeFeatures(NamedTuple):
 
 
 class DrawSettings(Settings):
-    """What lives are drawn from.
+    """The homes, households and table from which lives are drawn.
 
     Attributes:
         homes: Homes, as axes of a study have them: {synthetic: 40, first: 100}, {floorplans: …}.
@@ -147,7 +147,7 @@ class HomeList(LazySequence[Choice]):
     """The homes of axes, one after the other; those of synthetic axes are made when needed."""
 
     def __init__(self, axes: Sequence[Axis]) -> None:
-        """Read what folders and lists hold."""
+        """List the homes of folders and lists."""
         self._parts: list[SyntheticAxis | list[Choice]] = [
             axis if isinstance(axis, SyntheticAxis) else axis.choices(HOME) for axis in axes
         ]
@@ -182,12 +182,12 @@ class HomeList(LazySequence[Choice]):
 
 
 class Draw:
-    """Draws lives, each by its number, whatever was drawn before.
+    """Draws lives, each by its number alone.
 
     Attributes:
         homes: The homes.
         facts: Facts of homes that aren't synthetic, by their places; a life whose row or household
-            asks for bedrooms has one of those that fit.
+            asks for bedrooms gets one that fits.
         table_columns: The columns of the table, without the weights.
         columns: The columns of labels beside home, household and features.
     """
@@ -284,12 +284,12 @@ class Draw:
         return (self._seed * SEED_STEP + number) % MAX_SEED
 
     def share_of(self, number: int) -> float:
-        """Return a random number from 0 to 1 of a life, by which it joins a rollout."""
+        """Return a life's random number from 0 to 1, by which it joins a rollout."""
         key = stream_key(self._seed, "population", "rollout")
         return Draws(np.uint64(key), number).uniform()
 
     def life(self, number: int) -> FleetLife:
-        """Draw a life; without a reason for another one, homes are taken in turn."""
+        """Draw a life; homes are taken in turn unless its row or household asks for another."""
         draws = Draws(np.uint64(self._key), number)
         place = -1
         row: Mapping[str, Any] = {}
@@ -334,7 +334,7 @@ class Draw:
         return self._eligible[key]
 
     def _may_be(self, place: int, needed: int, asked: Mapping[str, Any]) -> bool:
-        """Return whether a home has so many bedrooms and what is asked; True if it is unknown."""
+        """Return whether a home may have the bedrooms needed and the features asked for."""
         facts = self.facts.get(place)
         if facts is None:
             return True
@@ -346,7 +346,7 @@ class Draw:
 
         Args:
             life: The life.
-            facts: Those of its home; None: conditions on homes aren't asked.
+            facts: The features of its home; None: conditions on homes aren't checked.
         """
         labels = life.labels | ({} if facts is None else feature_labels(life.household, facts))
         for column, condition in self._settings.where.items():
@@ -371,14 +371,14 @@ def _members(household: object) -> list[str]:
 
 
 def _is_like(column: str, fact: Any, asked: Any) -> bool:
-    """Return whether a home is as a row of the table says; a single area is rounded too finely."""
+    """Return whether a home is as a row of the table asks; no home has exactly a single area."""
     condition = read_condition(asked)
     is_area = column == AREA and not isinstance(condition, Range)
     return asked is None or is_area or fulfils(fact, condition)
 
 
 def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) -> Choice:
-    """Return a synthetic home with the bedrooms and the area of its row, or for its household."""
+    """Return a synthetic home with the bedrooms and area of its row, or fit for its household."""
     if not home.changes:
         return home
     (keys, plan), *others = home.changes
@@ -398,11 +398,11 @@ def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) ->
     (label,) = home.labels.values()
     size = ", ".join(f"{new[key]:g} {unit}" for key, unit in SIZE_UNITS if key in new)
     changes = ((keys, {**plan, **new}), *others)
-    return Choice({HOME: f"{label} ({size})"}, changes)  # another home of that seed is another one
+    return Choice({HOME: f"{label} ({size})"}, changes)  # the seed has homes of other sizes, too
 
 
 def _within(condition: Any, draws: Draws) -> float:
-    """Draw a number of a range; a number is itself."""
+    """Draw a number from a range; return a single number as it is."""
     if not isinstance(condition, Range):
         return float(condition)
     if condition.low.is_integer() and condition.high.is_integer():
@@ -411,7 +411,7 @@ def _within(condition: Any, draws: Draws) -> float:
 
 
 def _program(bedrooms: int, plan: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return the bedrooms of a synthetic home, and an area that homes of so many have."""
+    """Return settings of a synthetic home: its bedrooms, and an area usual for so many."""
     from fleet2d.homes.synthetic.program import (
         MAX_ROOMS_PER_TYPE,
         Choices,
@@ -433,7 +433,7 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
     """Return the rows of a table without their weights, the running sums of these, and the columns.
 
     Raises:
-        InputError: It can't be read, has no such column, or weights that can't be.
+        InputError: The table can't be read, lacks a column, or has impossible weights.
     """
     if settings.table is None:
         return [], [], []
@@ -465,7 +465,7 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
 
 
 def _frame_of(path: Path) -> "pl.DataFrame":
-    """Return a table as polars reads it; CSV with the marks of spreadsheets of any language."""
+    """Return a table as a data frame; CSV may have the separators of any language."""
     with extra("study", "tables of a population need polars"):
         import polars as pl
     content = read_bytes(path, FILE_BYTES)

@@ -1,4 +1,4 @@
-"""What a study of its size can tell, from a pilot: some of its variants, run for a minute."""
+"""Pilots: some variants of a study, run for a minute, show what a study of its size can tell."""
 
 import math
 import time
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 PILOT_S = 60.0
 # The number of combinations of home, people and seed in a pilot.
 PILOT_UNITS = 12
-RESERVE = 0.9  # share of pilots whose variance is not too small, after it
-MAX_OTHERS = 2  # values that are compared with the reference
+RESERVE = 0.9  # the share of pilots for which the assumed variance is large enough
+MAX_OTHERS = 2  # the most values that a pilot compares with the reference
 
 
 class Pilot(StudyAnswers):
-    """Some variants of a study, those that were complete in time.
+    """Some variants of a study that were complete in time.
 
     Attributes:
         whole: The labels of all variants of the study, with their simulated times.
     """
 
     def __init__(self, checked: CheckedStudy) -> None:
-        """Take a study whose variants haven't run."""
+        """Prepare a pilot of a study whose variants haven't run."""
         import polars as pl
 
         self.location = "the pilot"
@@ -57,12 +57,12 @@ class Pilot(StudyAnswers):
 
     @property
     def variants(self) -> "pl.DataFrame":
-        """Those that were complete in time."""
+        """The variants that were complete in time."""
         plan = self.whole.select(VARIANT, "simulated_s", *self.columns)
         return plan.join(self._results.drop("identity", strict=False), on=VARIANT)
 
     def chosen(self) -> "pl.DataFrame":
-        """Return the variants of the pilot: some units, with what is to be compared in each."""
+        """Return the variants of the pilot: some units, each with the values to compare."""
         import polars as pl
 
         references: dict[str, Any] = {}
@@ -129,7 +129,7 @@ class Pilot(StudyAnswers):
         return Conclusion(question, tuple(filter(None, (cost, few, says))))
 
     def _few(self, kind: str, count: int, comparisons: int) -> str:
-        """Return what a study of too few units to tell amounts can tell; empty if it has enough."""
+        """Return what a study with too few units for intervals can tell; empty if it has enough."""
         if count >= ENOUGH_UNITS:
             return ""
         tests = (MeanEstimate(1.0, signs={kind: (n, count - n)}) for n in range(count + 1))
@@ -157,7 +157,7 @@ class Pilot(StudyAnswers):
 def smallest_shown(pilot: MeanEstimate, units: Mapping[str, int], level: float) -> float:
     """Return the smallest mean that four of five studies show, by the variance of a pilot.
 
-    The variance of so small a sample is uncertain: it is the upper end of what it may be.
+    The variance of so small a sample is uncertain: the upper end of its interval is used.
 
     Args:
         pilot: The mean of the pilot.

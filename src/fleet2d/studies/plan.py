@@ -101,7 +101,7 @@ class KnownNames:
     A study that keeps or compares what no variant has would end without it, silently.
 
     Attributes:
-        facts: What readers should know of each metric.
+        facts: The description of each metric for readers.
     """
 
     def __init__(self) -> None:
@@ -153,7 +153,7 @@ class KnownNames:
 
     def _problem(self, name: str) -> str:
         """Return why no variant can have a metric, or one of a pattern; empty if some can."""
-        prefix = re.split(r"[*?[]", name)[0]  # the part that has to be there as it is
+        prefix = re.split(r"[*?[]", name)[0]  # the part without wildcards
         entry, dot, rest = prefix.partition(".")
         if not dot and prefix != name:
             if any(known.startswith(entry) for known in self._metrics):
@@ -202,7 +202,7 @@ def make_plan(
             continue
         template = template_hash(content)
         same = first_of.setdefault((template, inputs), first)
-        seeds = design.seeds_of(first)  # those of lives differ
+        seeds = design.seeds_of(first)  # each life has seeds of its own
         if same != first and repeated is None and design.seeds_of(same) == seeds:
             repeated = same, first
         home = home_key(content)
@@ -253,7 +253,7 @@ def setups_to_check(plan: StudyPlan) -> list[int]:
     """Return the places of variants in which each home meets each choice of every other axis.
 
     Their set-up shows people and robots that have no room where they start, without setting up
-    every variant. Of a fleet the first homes are enough: a later life that has no room fails by
+    every variant. For a fleet the first homes are enough: a later life without room fails by
     itself.
     """
     seeds = len(plan.design.seeds)
@@ -339,7 +339,7 @@ class ScenarioFile:
         self._texts.write(len(text).to_bytes(4) + text)
 
     def write(self, directory: StudyDirectory) -> None:
-        """Write them."""
+        """Write the scenarios to the folder of a study."""
         directory.storage.write_table(SCENARIOS, self._parts())
 
     def _parts(self) -> "Iterator[pa.Table]":
@@ -443,7 +443,7 @@ def write_plan(directory: StudyDirectory, plan: StudyPlan) -> None:
         used = set(np.unique(choices).tolist())
         for column, own in axis.labels().items():
             labels = [label if place in used else None for place, label in enumerate(own)]
-            places = choices[combination] % (len(labels) + 1)  # -1, of no choice, is the last
+            places = choices[combination] % (len(labels) + 1)  # -1 is the last, None
             columns.append(label_series([*labels, None]).gather(places).alias(column))
     names = (VARIANT, *PLAN_ONLY, "simulated_s")
     frame = plan.variants.select(*names, *columns, SEED)

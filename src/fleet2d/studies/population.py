@@ -41,15 +41,15 @@ from fleet2d.studies.lives import (
     HomeFeatures,
 )
 
-# So many lives are drawn for each that is kept, before conditions are too narrow.
+# The number of lives drawn for each to keep, above which conditions are too narrow.
 MAX_DRAWS = 20
-# Up to so many homes, starting workers costs more than it saves.
+# The number of homes up to which starting workers costs more than it saves.
 FEW_HOMES = 8
 # The number of reasons in one report.
 MAX_PROBLEMS = 10
 # The number of lives or variants that are named beside the first one of a reason.
 MAX_NAMED = 5
-# Why a life is left out whose synthetic home isn't found, though others are.
+# The reason to leave out a life whose synthetic home isn't found, though others are.
 NO_LAYOUT = "no layout of its home was found"
 
 
@@ -78,7 +78,7 @@ class PopulationAxis(Axis, DrawSettings):
 
     @cached_property
     def draw(self) -> "Draw":
-        """What its lives are drawn from.
+        """The draw of its lives.
 
         Raises:
             InputError: The table can't be read, or is wrong.
@@ -133,7 +133,7 @@ class UnbuiltHome(NamedTuple):
     """A home that can't be built.
 
     Attributes:
-        reason: Why.
+        reason: Why it can't be built.
         by_chance: Whether another synthetic home of as many rooms might be found.
     """
 
@@ -176,8 +176,8 @@ class FleetLives(LazySequence[Choice]):
         column: The column of their numbers.
         draw: What they are drawn from.
         numbers: The numbers of those that are kept: int32 (lives,).
-        features: What their homes are, by column.
-        left_out: How many others were drawn, by the first condition that they don't meet.
+        features: The features of their homes, by column.
+        left_out: The number of lives left out, by the first condition that they don't meet.
     """
 
     column: str
@@ -187,7 +187,7 @@ class FleetLives(LazySequence[Choice]):
     left_out: Mapping[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        """Return their number."""
+        """Return the number of lives."""
         return len(self.numbers)
 
     def item(self, index: int) -> Choice:
@@ -201,7 +201,7 @@ class FleetLives(LazySequence[Choice]):
 
     @property
     def words(self) -> str:
-        """How many are left out, and why."""
+        """The number of lives left out, and why, in words."""
         return left_out_words(self.column, self.left_out)
 
 
@@ -244,10 +244,10 @@ def first_life(axis: PopulationAxis, column: str) -> FleetLives:
 
 
 class LifeFinder:
-    """Finds lives that meet the conditions of what they are drawn from.
+    """Finds lives that meet the conditions of their draw.
 
     Attributes:
-        left_out: How many don't, by the first condition that they don't meet.
+        left_out: The number of lives left out, by the first condition that they don't meet.
     """
 
     def __init__(
@@ -362,7 +362,7 @@ def _home_changes(life: FleetLife) -> tuple[tuple[tuple[str, ...], Any], ...]:
 
 
 def raise_problems(problems: Sequence[str]) -> None:
-    """Raise an error about problems; those that differ by their subject and numbers are one.
+    """Raise an error that lists problems; those that differ only in subject and numbers are one.
 
     Raises:
         ScenarioError: There are problems.

@@ -28,7 +28,7 @@ class Study(StudyAnswers):
 
     Attributes:
         location: The folder or store, without secrets.
-        meta: Its description: name, columns, populations, comparisons.
+        meta: The description of the study: name, columns, populations, comparisons.
         columns: The columns of the axes, the seed last.
         populations: The columns whose values are a sample of a population.
 
@@ -52,11 +52,11 @@ class Study(StudyAnswers):
 
     @property
     def answer(self) -> Conclusion:
-        """What the study found, in sentences and a table; `print` shows it, and so do notebooks."""
+        """The findings in sentences and a table, as `print` and notebooks show them."""
         answer = fleet.with_fleet(self, StudyAnswer(self).answer())
         if self.meta.rollout is None:
             return answer
-        from fleet2d.studies.rollout import with_rollout  # few studies have one
+        from fleet2d.studies.rollout import with_rollout  # few studies have a rollout
 
         return with_rollout(self, answer)
 

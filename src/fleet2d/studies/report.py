@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 # The number of values of an axis that are listed.
 MAX_VALUES = 12
 MAX_SHARES = 3  # sources of the variance of a metric
-# from how many characters on names are shortened, and to how many
+# The numbers of characters above which a name is shortened, and that it keeps at least.
 LONG_NAME = 16
 SHORT_NAME = 6
 GLOSSARY = {
@@ -351,7 +351,7 @@ class _Page:
         return f'<img alt="{html.escape(name)}" src="data:image/svg+xml;base64,{data}">'
 
     def _frame(self, frame: "pl.DataFrame", name: str, text: Sequence[str] = ()) -> str:
-        """Write a data frame as CSV; return it as HTML. `text`: its columns of text."""
+        """Write a data frame as CSV; return it as HTML. `text` names its columns of text."""
         frame.write_csv(self.folder / "tables" / f"{name}.csv")
         head, rows = cells_of(frame.to_dicts())
         texts = (0, *(i for i, c in enumerate(frame.columns) if c in text))
@@ -378,7 +378,7 @@ def short_names(labels: Sequence[Any]) -> dict[Any, Any]:
 
 
 def _shortest_unique(texts: Sequence[str], part_of: Callable[[str, int], str]) -> list[str]:
-    """Return a part of each text, as short as tells different texts apart."""
+    """Return the shortest part of each text that tells different texts apart."""
     length = SHORT_NAME
     while True:
         parts = [part_of(text, length) for text in texts]

@@ -1,7 +1,7 @@
 """The results of variants: rows and tables in Parquet files, many variants in each.
 
-The file of a part's results names the files of its tables, which are written before it: what it
-doesn't name doesn't count.
+The file of a part's results names the files of its tables, which are written before it: files that
+it doesn't name don't count.
 """
 
 import json
@@ -90,10 +90,10 @@ def results_frame(rows: Iterable[Mapping[str, Any]]) -> "pl.DataFrame":
 
 
 class ResultWriter:
-    """Writes results into parts; a part is written again as it grows, each time at once."""
+    """Writes results in parts; a growing part is rewritten, each time as a whole."""
 
     def __init__(self, storage: Storage) -> None:
-        """Begin a part after those that there are."""
+        """Begin a part after the existing ones."""
         self._storage = storage
         self._number = max(map(part_of, part_names(storage)), default=0)
         self._next_flush_s = 0.0
@@ -116,10 +116,10 @@ class ResultWriter:
                 self._tables.setdefault(name, {})[number] = plain(table)
 
     def flush(self, *, now: bool = False) -> None:
-        """Write what is new, if it is time.
+        """Write new results, if it is time.
 
         Raises:
-            ArtifactError: It can't be written; what was written before stays.
+            ArtifactError: They can't be written; earlier results stay.
         """
         import polars as pl
 
@@ -199,7 +199,7 @@ def read_results(
 
     Args:
         storage: The files.
-        numbers: Those of the variants; None: all.
+        numbers: The numbers of the variants; None: all.
         columns: Columns of the results; None: all, and the metrics.
 
     Raises:

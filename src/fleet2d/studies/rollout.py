@@ -1,4 +1,4 @@
-"""Rollouts: a change that reaches a fleet in stages, and what can be said of it on each day.
+"""Rollouts: a change that reaches a fleet in stages, and what each day shows of its effect.
 
 On each day robots with the change are compared with those without it yet, as in the field: stages
 are drawn at random. Intervals hold on all days and for all metrics together, however often one
@@ -33,18 +33,19 @@ DAY_S = 86_400
 
 @dataclass(frozen=True)
 class RolloutLook:
-    """What is known of a metric at the end of a day.
+    """The evidence on a metric at the end of a day.
 
     Attributes:
         day: The number of days since the start of the runs.
         treated: The number of robots with the change.
         others: The number of robots without it.
-        difference: The mean of robots with it minus that of those without; NaN if there are none.
+        difference: The mean of robots with the change minus that of the others; NaN if one is
+            missing.
         low: The lower end of the interval; NaN if there are too few robots.
         high: Its upper end.
-        truth: What the change did to the robots with it: the mean difference to their own runs
+        truth: The true effect: the mean difference of robots with the change from their own runs
             without it.
-        without: The mean of the robots with it, had they not had it.
+        without: The mean of the same robots in their runs without the change.
     """
 
     day: int
@@ -57,7 +58,7 @@ class RolloutLook:
     without: float
 
     def breaks(self, bounds: Bounds) -> bool:
-        """Whether the whole interval is beyond what is allowed."""
+        """Whether the whole interval is beyond the bounds."""
         above = bounds.most is not None and self.low > bounds.most
         return above or (bounds.least is not None and self.high < bounds.least)
 
@@ -65,12 +66,12 @@ class RolloutLook:
 def looks_of(
     without: F64, treated: F64, begins: I64, level: float, days: Sequence[int]
 ) -> list[RolloutLook]:
-    """Return what is known of a metric on each of some days.
+    """Return the evidence on a metric at the end of each of some days.
 
     Args:
         without: The metric at the end of each day without the change: float64 (robots, days).
         treated: The same with the change, from its stage on: float64 (robots, days).
-        begins: The first day with the change, from 0 on; a large number: never. int64 (robots,)
+        begins: The first day with the change, from 0 on; large for never: int64 (robots,).
         level: The share of single intervals that contain the true difference.
         days: The days, from 0 on.
     """
@@ -101,14 +102,14 @@ def looks_of(
 
 
 def _slope(values: F64, before: F64, has: Bool) -> float:
-    """Return how much of a difference before the rollout is left, by which values are adjusted."""
+    """Return the slope of values over those before the rollout, by which values are adjusted."""
     centred = before - np.where(has, before[has].mean(), before[~has].mean())
     square = float((centred**2).sum())
     return float((centred * values).sum()) / square if square > 0 else 0.0
 
 
 class RolloutAnswer:
-    """What a rollout says.
+    """The answer of a study about its rollout.
 
     Attributes:
         settings: The rollout.
@@ -141,7 +142,7 @@ class RolloutAnswer:
         self.days = waiting or [*range(first, last)]
 
     def _robots(self) -> "pl.DataFrame":
-        """Return robots that are complete: number, stage, and the variants without and with it."""
+        """Return robots with complete runs: number, stage, variants without and with the change."""
         import polars as pl
 
         study = self._study
@@ -184,7 +185,7 @@ class RolloutAnswer:
 
     @cached_property
     def looks(self) -> dict[str, list[RolloutLook]]:
-        """What is known of each metric on each day."""
+        """The evidence on each metric, day by day."""
         level = 1 - (1 - LEVEL) / (len(self.days) * len(self.metrics))
         return {
             metric: looks_of(*self._values[metric], self._begins, level, self.days)
@@ -193,7 +194,7 @@ class RolloutAnswer:
 
     @cached_property
     def stop(self) -> tuple[str, RolloutLook] | None:
-        """The guard that stops the rollout first, and what was known then; None if none does."""
+        """The guard that stops the rollout first, with the evidence; None if no guard does."""
         breaks = [
             (look.day, metric, look)
             for metric, bounds in self.settings.guards.items()
@@ -232,7 +233,7 @@ class RolloutAnswer:
         return texts
 
     def _watched(self, metric: str, day: int) -> str:
-        """Return what is known of a metric on a day, and what is true."""
+        """Return a sentence on the evidence on a metric on a day, and on the truth."""
         look = next(each for each in self.looks[metric] if each.day == day)
         on = f"On {self.date_of(day)}"
         if not look.treated:
@@ -250,7 +251,7 @@ class RolloutAnswer:
         )
 
     def _had_it_gone_on(self, metric: str) -> str:
-        """Return what the stages after a stop would have done, as runs have them all."""
+        """Return what the stages after a stop would have done: the runs have all stages."""
         without, treated = self._values[metric]
         (look,) = looks_of(without, treated, self._begins, LEVEL, [without.shape[1] - 1])
         return (
@@ -295,8 +296,8 @@ class RolloutAnswer:
     def table(self) -> "pl.DataFrame":
         """All looks: a row for each number and day.
 
-        The intervals hold on any day, for all numbers together. `truth` is what the change did to
-        the robots with it, and `mean without it` what they would have had otherwise.
+        The intervals hold on any day, for all numbers together. `truth` is the true effect on the
+        robots with the change, and `mean without it` their mean in runs without it.
         """
         import polars as pl
 
@@ -319,7 +320,7 @@ class RolloutAnswer:
         return pl.DataFrame(rows, infer_schema_length=None)
 
     def figure(self) -> "Figure":
-        """Draw each number over the days: what was known, what was true, and what is allowed."""
+        """Draw each metric over the days: the evidence, the truth, and the bounds."""
         import matplotlib.pyplot as plt
 
         names = list(self.looks)
@@ -355,7 +356,7 @@ def _size(difference: float) -> str:
 
 
 def with_rollout(study: StudyAnswers, answer: Conclusion) -> Conclusion:
-    """Return the answer of a study with what it says of its rollout."""
+    """Return the answer of a study, extended by the answer about its rollout."""
     if not study.counts.complete:
         return answer
     try:

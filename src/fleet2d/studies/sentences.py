@@ -1,4 +1,4 @@
-"""What a study, a test or a search says: a question, two to six sentences, and one small table."""
+"""Conclusions of studies, tests and searches: a question, two to six sentences, a small table."""
 
 import html
 import itertools
@@ -32,13 +32,13 @@ NOT_SHOWN = ("high", "doubt", "variance_ratio", "needed", "clear", "verdict")
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What was found, to be read and acted on.
+    """The findings of a study, a test or a search.
 
     Attributes:
         question: The question.
         sentences: The answer.
-        table: Its numbers: rows of the same columns, which may be `low`, `high` and `doubt`. Texts
-            show the first twelve.
+        table: Its numbers: rows of the same columns, such as `low`, `high` and `doubt`. Texts show
+            the first twelve.
     """
 
     question: str
@@ -47,7 +47,7 @@ class Conclusion:
 
     @property
     def content(self) -> dict[str, Any]:
-        """The same for JSON, which has no NaN."""
+        """The conclusion as JSON data, which has no NaN."""
         rows = [_without_nan(row) for row in self.table]
         return {"question": self.question, "sentences": list(self.sentences), "table": rows}
 
@@ -62,7 +62,7 @@ class Conclusion:
 
     @property
     def _rest(self) -> list[str]:
-        """How many rows a text doesn't show, if any."""
+        """A line with the number of rows that a text doesn't show, if any."""
         more = len(self.table) - MAX_ROWS
         return [f"… and {counted(more, 'more row')}"] if more > 0 else []
 
@@ -76,7 +76,7 @@ class Conclusion:
 
 
 def is_missing(value: Any) -> bool:
-    """Return whether a value of a table is none, or no number that can be shown."""
+    """Return whether a value of a table is None, NaN or infinite."""
     return value is None or (isinstance(value, float) and not math.isfinite(value))
 
 
@@ -92,7 +92,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 
 
 def cells_of(rows: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
-    """Return the heads of the columns of a table of answers that are shown, and its cells."""
+    """Return the headings and the cells of a table of answers, without the columns not shown."""
     columns = [column for column in rows[0] if column not in NOT_SHOWN]
     head = [HEADINGS.get(c, c.removeprefix("n_").replace("_", " ")) for c in columns]
     return head, [_cells(row, columns) for row in rows]
@@ -108,7 +108,7 @@ def html_table(
     text: Sequence[int] = (0,),
     hints: Mapping[str, str] | None = None,
 ) -> str:
-    """Return an HTML table; `text` holds the indices of its columns of text, `hints` is by head."""
+    """Return an HTML table; `text` holds the indices of its columns of text, `hints` is by name."""
 
     def line(tag: str, values: Sequence[str]) -> str:
         found = []
@@ -188,12 +188,12 @@ class StudyAnswer:
     """Writes the answer of a study.
 
     Attributes:
-        tables: For each comparison that the study asks for what it says, corrected for all of
-            them; or why there is none.
+        tables: The results of each comparison that the study asks for, corrected for all of them;
+            or why there are none.
     """
 
     def __init__(self, study: StudyAnswers) -> None:
-        """Compare what the study asks for, or else each axis by what it can judge."""
+        """Make the comparisons that the study asks for, or else one of each axis and metric."""
         self._study = study
         self.asked = study.comparisons or tuple(self._default())
         found: list[list[Comparison] | InputError] = []
@@ -210,9 +210,9 @@ class StudyAnswer:
         ]
 
     def _default(self) -> "Iterator[PairedComparison]":
-        """Yield the comparisons of a study that names none: by a number of each metric.
+        """Yield the comparisons of a study that names none: by one number of each metric.
 
-        It is the first that can be judged. Of all numbers, chance would make some differ.
+        That is the first that can be judged: among all numbers, some would differ by chance.
         """
         from fleet2d.studies.specification import PairedComparison
 
@@ -224,7 +224,7 @@ class StudyAnswer:
         for metric in list(firsts.values())[:MAX_METRICS]:
             for axis in self._varying(study.variants, populations=False):
                 if axis in study.meta.features:
-                    continue  # no two robots differ by one of them alone
+                    continue  # robots never differ by one feature alone
                 values = study.with_metric(metric)[axis].drop_nulls()
                 if len(values):
                     yield PairedComparison(metric=metric, against={axis: values[0]})
@@ -257,7 +257,7 @@ class StudyAnswer:
 
     @cached_property
     def comparisons(self) -> list[Comparison]:
-        """All that could be compared."""
+        """All comparisons that could be made."""
         return [c for table in self.tables if isinstance(table, list) for c in table]
 
     def answer(self) -> Conclusion:

@@ -105,7 +105,7 @@ def execute(
 
 
 def _run_by_day(scenario: Scenario, metrics: Sequence[str]) -> "tuple[Run, pa.Table]":
-    """Run a scenario; return also some numbers at the end of each day, as metrics last had them."""
+    """Run a scenario; return also the latest numbers of metrics at the end of each day."""
     import pyarrow as pa
 
     simulation = Simulation(scenario)

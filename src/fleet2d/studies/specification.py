@@ -155,7 +155,7 @@ class Rollout(Settings):
     guards: dict[str, Bounds] = Field(default={})
 
     def model_post_init(self, _: object, /) -> None:
-        """Require stages that grow, bounds, and something to look at."""
+        """Require growing stages, bounds, and metrics to watch."""
         ordered = [self.stages[day] for day in sorted(self.stages)]
         if ordered != sorted(set(ordered)) or not ordered[0] > 0:
             raise problem("each stage must reach more robots than the one before")
@@ -167,7 +167,7 @@ class Rollout(Settings):
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """All metrics that it follows."""
+        """All metrics, watched or guarded."""
         return tuple(dict.fromkeys((*self.watch, *self.guards)))
 
     def stage_of(self, share: float) -> str:
@@ -280,7 +280,7 @@ class StudyFile(Settings):
         return self
 
     def conditions(self) -> Iterator[tuple[Location, Mapping[str, Any]]]:
-        """Yield the conditions on columns, but those of axes, and where they stand."""
+        """Yield the conditions on columns except those of axes, each with its location."""
         yield from ((("rules", i, "when"), rule.when) for i, rule in enumerate(self.rules))
         yield from ((("exclude", i), condition) for i, condition in enumerate(self.exclude))
         yield from ((("compare", i, "against"), c.against) for i, c in enumerate(self.compare))
@@ -288,7 +288,7 @@ class StudyFile(Settings):
             yield ("tune", "held_out"), self.tune.held_out
 
     def named_metrics(self) -> Iterator[tuple[Location, str]]:
-        """Yield the metrics that the file names, or patterns of some, and where they stand."""
+        """Yield the metrics and patterns that the file names, each with its location."""
         yield from ((("compare", i, "metric"), each.metric) for i, each in enumerate(self.compare))
         yield from ((("keep", "metrics", i), each) for i, each in enumerate(self.keep.metrics))
         if self.tune is not None:

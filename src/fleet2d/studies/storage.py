@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def writing(location: str | Path) -> Iterator[None]:
-    """Within the context, an error while something is written names its place and the remedy.
+    """Turn errors of writing within the context into one that names the place and the remedy.
 
     Raises:
         ArtifactError: It can't be written.
@@ -77,7 +77,7 @@ class Storage:
                     f"{self.location} can't be used as a store: {error}; write a folder, or a"
                     " location like s3://bucket/study"
                 ) from error
-            if isinstance(self.filesystem, pafs.LocalFileSystem):  # file://, a folder like others
+            if isinstance(self.filesystem, pafs.LocalFileSystem):  # file://, a local folder
                 self.folder = Path(self.root)
                 self.location = self.root
         else:
@@ -134,7 +134,7 @@ class Storage:
 
     @contextmanager
     def reading(self, name: str) -> Iterator[None]:
-        """Within the context, errors about the content of a file name it and the remedy.
+        """Turn errors of reading within the context into one that names the file and the remedy.
 
         Raises:
             RunDirectoryError: The file is missing, damaged, or can't be read.
@@ -194,8 +194,8 @@ class Storage:
 
         Args:
             name: The file.
-            parts: Parts of the table, one at least, each of which becomes a group of rows.
-            group_rows: Rows of a group, of larger parts.
+            parts: Parts of the table, one at least; each begins a group of rows.
+            group_rows: The largest number of rows of a group; None: that of pyarrow.
 
         Raises:
             ArtifactError: It can't be written.
@@ -224,7 +224,7 @@ class Storage:
 
     @contextmanager
     def _replacing(self, name: str) -> Iterator[BinaryIO]:
-        """Yield a new file, which replaces one in the end; of a remote store, one in memory.
+        """Yield a new file that replaces the old one in the end; for a remote store, in memory.
 
         Raises:
             ArtifactError: It can't be written.
@@ -257,7 +257,7 @@ class Storage:
         pa.default_memory_pool().release_unused()
 
     def check(self, name: str) -> None:
-        """Read a Parquet file of a local folder, with its checksums; of another, only its footer.
+        """Read a Parquet file of a local folder, with its checksums; of a store, only its footer.
 
         Raises:
             RunDirectoryError: There is none, or it is damaged.

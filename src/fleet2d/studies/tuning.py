@@ -193,7 +193,7 @@ class TuneResult:
 
 
 def search_identity(plan: StudyPlan, settings: TuneSettings) -> dict[str, str]:
-    """Return what the trials of a search depend on, by its name in messages: as hashes or as text.
+    """Return the inputs of a search's trials, as hashes or texts, by their names in messages.
 
     Trials of another search may have seen the homes that are now held out, or have been judged by
     another objective; so they never count for this one.
@@ -264,7 +264,7 @@ def tune(
         from optuna.storages.journal import JournalFileBackend
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     identity = search_identity(plan, settings)
-    make_sampler(settings, 0)  # its errors come before anything is written
+    make_sampler(settings, 0)  # its errors should come before anything is written
     with directory.locked():
         _check_identity(directory.storage, identity, changed)
         name = f"{specification.name} {content_hash(identity)}"
@@ -276,7 +276,7 @@ def tune(
     best = _best(study)
     overrides = _overrides(best, settings)
     held_out = _check_held_out(specification, plan.design, overrides, settings)
-    # After more trials, the best settings may be others.
+    # More trials may have changed the best settings.
     run_study(held_out, directory.storage.folder / HELD_OUT, crew, changed="redo")
     states = [trial.state.name.lower() for trial in study.trials]
     return TuneResult(
@@ -348,7 +348,7 @@ def _check_identity(
         with storage.reading(SEARCH):
             stored = TypeAdapter(dict[str, str]).validate_json(storage.read(SEARCH))
         changes = [name for name in identity if identity[name] != stored.get(name)]
-        if changes != [INPUTS]:  # it varies with all others
+        if changes != [INPUTS]:  # input files change with any other cause, too
             changes = [name for name in changes if name != INPUTS]
     elif storage.exists(TRIALS):
         changes = ["the version of Fleet2D"]
@@ -407,7 +407,7 @@ class Search:
                 observer(finished, total, best[0].value if best else math.nan)
 
     def _run_batch(self, trials: "list[optuna.Trial]") -> None:
-        """Run trials, and tell Optuna what came of each."""
+        """Run trials, and report their results to Optuna."""
         keys = itertools.product(trials, self._variants)
         search = self._settings.search.items()
         settings = {}
@@ -423,7 +423,7 @@ class Search:
             for end in itertools.chain.from_iterable(rounds):
                 number = end.task.trial
                 trial = by_number.get(number)
-                if trial is None:  # it has failed
+                if trial is None:  # another variant has failed
                     continue
                 value, error = end.payload or (math.nan, end.loss)
                 if error is not None:
