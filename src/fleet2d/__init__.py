@@ -68,7 +68,7 @@ def _join_notebook() -> None:
         from importlib.metadata import entry_points  # slow to import, and only needed here
 
         for entry in entry_points(group="fleet2d.notebook"):
-            with suppress(ModuleNotFoundError):  # a limb that was taken away
+            with suppress(ModuleNotFoundError):  # the limb is not installed
                 shell.extension_manager.load_extension(entry.value)
 
 

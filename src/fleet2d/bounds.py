@@ -19,7 +19,7 @@ class Bound:
     """An upper bound on something in a file.
 
     Attributes:
-        name: The name of the environment variable that raises it, without `FLEET2D_MAX_`.
+        name: The name of the environment variable that raises the bound, without `FLEET2D_MAX_`.
         default: The bound without that variable.
         noun: What is counted, for messages.
 
@@ -36,7 +36,7 @@ read more, set FLEET2D_MAX_DEPTH=100 in the environment
 
     @property
     def variable(self) -> str:
-        """The name of the environment variable that raises it."""
+        """The name of the environment variable that raises the bound."""
         return f"FLEET2D_MAX_{self.name}"
 
     @property
@@ -147,22 +147,22 @@ def read_bytes(path: Path, bound: Bound, error: type[Fleet2DError] = InputError)
     """Return the content of a regular file of a bounded size.
 
     Raises:
-        OSError: It can't be read.
+        OSError: The file can't be read.
         Fleet2DError: It is larger than the bound, or `open_input` refuses it; of the type `error`.
     """
     check_file(path, bound, error)
     with open_input(path, error) as file:
         content = file.read(bound.limit + 1)
-    bound.check(len(content), path, error)  # it may have grown in the meantime
+    bound.check(len(content), path, error)  # the file may have grown in the meantime
     return content
 
 
 def check_file(path: Path, bound: Bound, error: type[Fleet2DError] = InputError) -> None:
-    """Refuse a file that is larger than a bound, and what `input_path` refuses.
+    """Refuse a file that is larger than a bound or that `input_path` refuses.
 
     Raises:
         OSError: There is no such file.
-        Fleet2DError: It is refused; of the type `error`.
+        Fleet2DError: The file is refused; of the type `error`.
     """
     bound.check(input_path(path, error).stat().st_size, path, error)
 
@@ -188,15 +188,15 @@ def _width_of(kind: Any) -> int:
     """Return the minimum number of bytes of a value of an Arrow type."""
     try:
         return max(1, int(kind.bit_width) // 8)
-    except ValueError:  # the offset of a text or a list
+    except ValueError:  # a text or a list takes at least its offset
         return 4
 
 
 def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object by its keys and values, as `object_pairs_hook` of `json` gets them.
+    """Return the JSON object of some keys and values, as an `object_pairs_hook` of `json`.
 
     Raises:
-        ValueError: It has a key twice: `json` would keep the second value and drop the first.
+        ValueError: A key is there twice: `json` would keep the second value and drop the first.
     """
     result = dict(pairs)
     if len(result) < len(pairs):

@@ -1,4 +1,4 @@
-"""Exceptions, all derived from :class:`Fleet2DError`, and what turns other failures into them."""
+"""Exceptions, all derived from :class:`Fleet2DError`, and contexts that raise them for others."""
 
 import signal
 import sys
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
-# A longer line of a message quotes input, and is shortened to its head and tail [characters].
+# Longer lines of a message quote input; they are shortened to head and tail [characters].
 _LONGEST = 1000
 _HEAD = 600
 _TAIL = 300
@@ -213,11 +213,11 @@ class blame:  # noqa: N801  (used as a function)
 
     @property
     def time(self) -> str:
-        """When it is running, in words."""
+        """The time at which the component runs, in words."""
         return "when it was started" if self.step is None else f"at step {self.step}"
 
     def __enter__(self) -> None:
-        """Make this the running component."""
+        """Mark the component as running."""
         self._outer = blame.now
         blame.now = self
 
@@ -253,7 +253,7 @@ def end_by_signal(*_: object) -> None:
 def ctrl_c_watch() -> Iterator[None]:
     """Note whether Ctrl-C is pressed: a KeyboardInterrupt without it is a component's."""
     before = signal.getsignal(signal.SIGINT)
-    if before not in (signal.default_int_handler, signal.SIG_IGN):  # a program's own
+    if before not in (signal.default_int_handler, signal.SIG_IGN):  # the program handles SIGINT
         yield
         return
 

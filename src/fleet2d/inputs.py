@@ -1,7 +1,7 @@
 """Input files: what a command line, a scenario or a stored folder names, and how it is opened.
 
-What is opened decides, however it is named: links are followed first, and what isn't a regular file
-is refused, since a pipe may never answer. Within a root, nothing outside of it is opened.
+Links are followed before a file is checked, and anything but a regular file is refused, since a
+pipe may never answer. Within a root, nothing outside of it is opened.
 """
 
 import hashlib
@@ -19,7 +19,8 @@ PACKAGE = Path(__file__).resolve().parent
 """Scenarios, personas and tables that come with Fleet2D, which are read within any root."""
 
 _ROOT: ContextVar[Path | None] = ContextVar("root", default=None)
-# A pipe that takes a file's place after the check doesn't block; nor is a link followed then.
+# A pipe or a link may take a file's place after the check: the one must not block, the other not be
+# followed.
 _SAFELY = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
 
 
@@ -41,10 +42,10 @@ def within(root: Path) -> Iterator[None]:
 
 
 def resolved(path: Path | str, error: type[Fleet2DError] = InputError) -> Path:
-    """Return a path with links followed; nothing needs to exist there.
+    """Return a path with its links followed, whether or not anything exists there.
 
     Raises:
-        Fleet2DError: It leads out of the root, or no file can have such a name; of the type
+        Fleet2DError: The path leads out of the root, or no file can have such a name; of the type
             `error`.
     """
     try:
@@ -61,7 +62,7 @@ def input_path(path: Path | str, error: type[Fleet2DError] = InputError) -> Path
     """Return the path of an input file or folder with links followed, for a library to open.
 
     Raises:
-        OSError: There is none.
+        OSError: There is no such file or folder.
         Fleet2DError: It leads out of the root, or is a device, a pipe or a socket; of the type
             `error`.
     """
@@ -76,7 +77,7 @@ def open_input(path: Path | str, error: type[Fleet2DError] = InputError) -> Buff
     """Open an input file.
 
     Raises:
-        OSError: It can't be opened, or is a folder.
+        OSError: The file can't be opened, or is a folder.
         Fleet2DError: It leads out of the root, or is a device, a pipe or a socket; of the type
             `error`.
     """
@@ -96,7 +97,7 @@ def sha256_of_file(path: Path | str) -> str:
     """Return the SHA-256 of an input file, as hexadecimal digits.
 
     Raises:
-        OSError: It can't be read.
+        OSError: The file can't be read.
         InputError: It leads out of the root, or is a device, a pipe or a socket.
     """
     with open_input(path) as file:

@@ -1,7 +1,7 @@
 """The Python interface of the compiled core: arrays and integers in, arrays and integers out.
 
-It has the functions and constants of :mod:`fleet2d._core` that others need, and the named tuples
-that these take and return, with their shapes and units.
+It exports the functions and constants of :mod:`fleet2d._core` that other modules need, and defines
+the named tuples that these take and return, with shapes and units.
 
 The types of arrays, which the whole project uses, are named by their elements: `I64` is an array
 of int64 of any shape, `F64` one of float64, `Bool` one of booleans.
@@ -16,10 +16,10 @@ sines. No sine or arc tangent is computed at run time: they differ in the last b
 entry i is the angle i * 2 pi / 8192, rounded to 2**-30, where all math libraries agree.
 
 **The space between walls** is a mesh, a triangulation of the free space whose vertices are all wall
-vertices. Everything that sight and paths need follows from it by integer arithmetic. Which of the
-many possible triangulations it is never shows in a result. Across the edges that are walls, the
-neighbor is `WALL`. A cell has `SUB` lattice units; `CELL_CENTRE`, the offset of its centre, is odd,
-so that no axis-parallel wall runs through a centre. Pixels outside a mask count as not in the mask.
+vertices. Everything that sight and paths need follows from it by integer arithmetic. Results don't
+depend on which of the possible triangulations it is. The neighbor across a wall edge is `WALL`. A
+cell has `SUB` lattice units; `CELL_CENTRE`, the offset of its centre, is odd, so that no
+axis-parallel wall runs through a centre. Pixels outside a mask count as not in the mask.
 
 **A shortest path** in a polygonal space bends only at its reflex corners (Lozano-Pérez and Wesley,
 Communications of the ACM 22, 1979): `Routes` is A* over the corners that a taut string can touch.
@@ -83,7 +83,7 @@ def in_radians(heading: int | I64) -> Any:
 
 
 def rounded(values: Any) -> I64:
-    """Return the nearest integers, the even one of two: int64 of the same shape."""
+    """Return values rounded to integers, half to even: int64 of the same shape."""
     return np.rint(values).astype(np.int64)
 
 
@@ -119,8 +119,8 @@ class Corners(NamedTuple):
 
     vertex: I64  # (nodes,) the vertex of the mesh at each, ascending
     before: I64  # (nodes, 2) the vertex of the border before the corner [lattice]
-    after: I64  # (nodes, 2) and the one after it
-    simple: Bool  # (nodes,) False where several walls meet: no one before and after
+    after: I64  # (nodes, 2) the vertex of the border after the corner [lattice]
+    simple: Bool  # (nodes,) False where several walls meet, so none is before or after
 
 
 UNKNOWN_TRUTH = -2
@@ -131,13 +131,13 @@ class RoomFloor(NamedTuple):
     """The floor of a room and what surrounds it; (rows, columns) unless noted otherwise."""
 
     holds: Bool  # cells that furniture may cover
-    whole: Bool  # cells that no wall cuts: what must stay empty before furniture is of these
+    whole: Bool  # cells that no wall cuts; the floor kept empty in front of furniture is of these
     before_walls: I32  # (4, rows + 1, columns + 1) corner_sums of cells before a wall, by turn
     from_doors: I64  # squared distance from the floor before doors [cells]
 
 
 class GroupRule(NamedTuple):
-    """A group of furniture, and what its places are worth."""
+    """A group of furniture, and the points that a place earns."""
 
     width: int  # extent along the back [cells]
     depth: int  # extent away from the back [cells]
@@ -172,19 +172,19 @@ class Lenses(NamedTuple):
     far_squared: I64
     half_angle: I64  # 1/8192 of a turn; 4096 and more is all round
     chance: I64  # probability of noticing a user in view, times 2**53
-    moves: I64  # 0 if it is at the robot's centre and looks straight ahead
-    forward: I64  # its position in the robot's frame [lattice units]
+    moves: I64  # 0 if the camera is at the robot's centre and looks straight ahead
+    forward: I64  # the camera's position in the robot's frame [lattice units]
     left: I64
-    heading: I64  # its heading relative to the robot's
+    heading: I64  # the camera's heading relative to the robot's
     pans: I64  # (cameras, headings): added to `heading`, one after the other
     pan_count: I64
-    pan_us: I64  # time at each of these headings
+    pan_us: I64  # time at each of these headings [us]
     period: I64  # steps from look to look
     latency: I64  # steps until a sighting is known
     errs: I64  # 1 where what is perceived can be wrong
     points: I64  # points of a user's body besides its centre that are looked at
-    bodies: I64  # (cameras, users, points + 1, 2): where they are, from the centre; it is first
-    reach: I64  # (cameras, users): how far they are from it
+    bodies: I64  # (cameras, users, points + 1, 2): centre and points, relative to the centre
+    reach: I64  # (cameras, users): distance of the points from the centre
     widest: I64  # (cameras, users): farthest distance of a centre in view, squared
 
 
@@ -197,13 +197,13 @@ class Heights(NamedTuple):
     corners: I64  # (corners, 2): the outlines of furniture, piece after piece [lattice units]
     start: I64  # (pieces + 1,): where each piece begins in `corners`
     boxes: I64  # (pieces, 4): smallest x and y, and largest, of each piece
-    top: I64  # (pieces,)
+    top: I64  # (pieces,): height of each piece
 
 
 def camera_poses(
     lenses: Lenses, camera: int, body: tuple[I64, I64, I64], moments_us: I64
 ) -> tuple[I64, I64, I64]:
-    """Return where a camera is and where it looks at some moments, as `camera_pose` does.
+    """Return the positions and headings of a camera at some moments, as `camera_pose` does.
 
     Args:
         lenses: The cameras of a body.
@@ -237,8 +237,8 @@ class ErrorTables(NamedTuple):
     table: I64  # (cameras, TABLE): the parts of TablePart, one after the other
     confusion: I64  # (cameras, users, users): which user one is mistaken for, cumulative
     has_ghosts: I64  # (cameras,): 1 if there are false positives
-    ghosts: I64  # (cameras, MAX_GHOSTS): number in one look, of all sources, cumulative
-    source: I64  # (cameras, sources): the source of one, cumulative
+    ghosts: I64  # (cameras, MAX_GHOSTS): number of them in one look, cumulative
+    source: I64  # (cameras, sources): the source of a false positive, cumulative
     spot: I64  # (cameras, sources, 3): x, y, noise as RANGE_NOISE; source 0 is the whole view
     looks_like: I64  # (cameras, users + 1): identity of a false positive, nobody last, cumulative
     keys: U64  # (cameras, users, len(UserDraw)): streams
@@ -267,7 +267,7 @@ class PoseBlock(NamedTuple):
 class SightMemory(NamedTuple):
     """The state of a robot's perception between spans.
 
-    An axis of identities has a row for each user, and last one for people who weren't recognized.
+    An axis of identities has an entry for each user, and a last one for people not recognized.
     """
 
     noticed: I64  # (identities,): last step at which the identity was noticed; -1: never
@@ -289,7 +289,7 @@ class DetectionRule(NamedTuple):
     step_us: int
     start_us: int  # time of day at step 0
     burst: int  # maximum number of sightings that become known in one step
-    stop_lost: bool  # whether an event ends the span
+    stop_lost: bool  # whether the loss of an identity ends the span
     stop_seen: bool
 
 
@@ -310,7 +310,7 @@ class BatteryState(NamedTuple):
     """A battery at a moment; its charge changes at one of three rates."""
 
     level: float  # 0 to 1
-    since_us: int  # the moment
+    since_us: int  # time of `level` since the start
     driving: float  # rates [1/us]: driving or turning,
     standing: float  # standing still,
     charging: float  # and at the charger
@@ -324,8 +324,8 @@ class RoomMemory(NamedTuple):
 
     Attributes:
         last: int64 (people + 2, rooms), the step of the last sighting, -1 for none.
-        looks: int64 (people + 2, rooms, 24), their number in each hour of the day.
-        total: int64 (people + 2, rooms), their number.
+        looks: int64 (people + 2, rooms, 24), number of sightings in each hour of the day.
+        total: int64 (people + 2, rooms), number of sightings.
     """
 
     last: I64
@@ -339,7 +339,7 @@ class ShownMemory(NamedTuple):
     Attributes:
         fresh_rows: int64 (n,), rows of `last`; -1: the robot's own visits.
         fresh_at: int64 (n,), their columns.
-        scale_s: float64 (n,), what happened this long ago counts half [s].
+        scale_s: float64 (n,), age at which a sighting counts half [s].
         habit_rows: int64 (m,), first a row of `total`, then rows of `looks` in the present hour.
         habit_at: int64 (m,), their columns.
     """
@@ -407,7 +407,7 @@ class CoverageSetup(NamedTuple):
         patch_of_cell: int16 (rows, columns), the patch of each cell, a room or a part of one; -1
             for none.
         step_us: Length of a step.
-        every: It looks at multiples of this step; each look counts for this many steps.
+        every: The robot looks at multiples of this step; each look counts for this many steps.
         bin_steps: Steps of a bin of `CoverageRecord.binned`; bins begin at step 0.
     """
 
@@ -444,7 +444,7 @@ class Breakpoints(NamedTuple):
 
 
 class Distances(NamedTuple):
-    """What each of some bodies keeps from all bodies, (rows, bodies) each."""
+    """The distances that bodies keep from each other, (rows, bodies) each."""
 
     lead: I64  # steps by which it reacts before a meeting; below 0: it ignores the other one
     near: I64  # distance of the middles below which they mustn't approach [lattice]

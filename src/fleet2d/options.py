@@ -39,7 +39,7 @@ def resume_hint(time: datetime, directory: Path) -> str:
 
 
 def split(arguments: list[str] | None) -> tuple[str | None, list[str]]:
-    """Return the scenario, None if there is none, and the overrides, which have a '='."""
+    """Return the scenario, or None, and the overrides, which contain a '='."""
     if arguments and "=" not in arguments[0]:
         return arguments[0], arguments[1:]
     return None, list(arguments or [])
@@ -60,6 +60,6 @@ Trust = Annotated[
 
 
 def show_code(manifest: Mapping[str, Any]) -> None:
-    """Print the code and the programs of a stored run that the user trusts, by its manifest."""
+    """Print the code and programs that a trusted stored run names in its manifest."""
     if lines := code_lines(content_of_run(manifest)):
         typer.echo("\n".join(["trusted, with all files in these folders:", *lines]), err=True)

@@ -54,7 +54,7 @@ ACCENT_COLOR = "#c8452f"
 
 
 def room_color(kind: str, number: int = 0) -> str:
-    """Return the colour of a room on a floor plan by its type, and its number among those.
+    """Return the colour of a room on a floor plan by its type, and its number within the type.
 
     >>> room_color("bedroom"), room_color("bedroom", 1)
     ('#c9dcf2', '#aecbeb')

@@ -1,7 +1,7 @@
 """The command line: `fleet2d run`, `validate`, `show` and the rest; see `fleet2d --help`.
 
-No run depends on the standard streams of a command: whoever starts it may have closed some, or they
-may lead to a full disk, a terminal that is gone, or an encoding without all characters.
+No run depends on the standard streams of a command: some may be closed, or lead to a full disk, a
+terminal that is gone, or an encoding without all characters.
 """
 
 import gc
@@ -21,7 +21,7 @@ def main() -> NoReturn:
     """Run the command line; exit codes: 0 success, 1 failure, 2 wrong input, 130 interrupted."""
     # NumPy starts a thread for each core when it is imported; nothing here multiplies matrices.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # To look for pydantic's plugins takes as long as to import it.
+    # Looking for pydantic's plugins takes as long as importing it.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     keep_free_memory()
     open_streams()
@@ -57,16 +57,16 @@ def main() -> NoReturn:
 
 @contextmanager
 def named_extras() -> Iterator[None]:
-    """Name the extra that installs a module that is imported in the block and isn't there.
+    """Name the extra of a missing module that is imported in the block.
 
     Raises:
-        InputError: An extra has it, or it is a limb of Fleet2D.
+        InputError: An extra installs the module, or it is a limb of Fleet2D.
     """
     try:
         yield
     except ModuleNotFoundError as error:
         name = (error.name or "").partition(".")[0]
-        if name == "fleet2d":  # a limb that was taken away
+        if name == "fleet2d":  # the limb is not installed
             raise InputError(
                 f"this needs {error.name}, which is missing: reinstall fleet2d"
             ) from None
@@ -95,13 +95,13 @@ class _StandardStream(io.FileIO):
     """stdout or stderr; after the first output that can't be written, further output is dropped.
 
     Attributes:
-        problem: Why it can't be written; empty if it can.
+        problem: Why the stream can't be written; empty if it can.
     """
 
     problem = ""
 
     def __init__(self, number: int, *, fails: bool) -> None:
-        """Open it; unless it `fails`, the first output is dropped, too."""
+        """Open the stream; unless it `fails`, the first output is dropped, too."""
         super().__init__(number, "w", closefd=False)
         self._fails = fails
 
@@ -109,7 +109,7 @@ class _StandardStream(io.FileIO):
         """Write bytes.
 
         Raises:
-            OSError: They can't be written.
+            OSError: The bytes can't be written.
         """
         if not self.problem:
             try:
@@ -127,8 +127,8 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # The lowest number that is free: otherwise a file of the run would get it, and with it
-            # all messages. Results must not vanish in silence: writing to stdout fails.
+            # Otherwise a file of the run would get the free number, and all messages with it.
+            # Results must not vanish in silence: writing to stdout fails.
             os.open(os.devnull, os.O_RDONLY if number == 1 else os.O_RDWR)
     # A test or a notebook may have replaced them. Both sides are None if a stream was closed.
     if sys.stdout is sys.__stdout__:
@@ -146,7 +146,7 @@ def output_problem() -> str:
     try:
         sys.stdout.flush()
     except OSError:
-        sys.stdout.flush()  # drops what is left, so that it doesn't fail when Python ends
+        sys.stdout.flush()  # the rest is dropped now, so that Python doesn't fail on it at exit
     return raw.problem
 
 

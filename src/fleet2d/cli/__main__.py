@@ -1,4 +1,4 @@
-"""The program `fleet2d`, also as `python -m fleet2d`, and how its commands are found.
+"""The program `fleet2d`, also run as `python -m fleet2d`, and the search for its commands.
 
 A command is a function of its name, or a Typer app of several commands, in a module of this package
 that `COMMANDS` names. Installed packages add others by entry points of the group `fleet2d.command`,
@@ -73,7 +73,7 @@ class Commands(TyperGroup):
         return groups
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command, None if there is none of that name."""
+        """Return the command of a name, None if there is none."""
         module = COMMANDS.get(cmd_name)
         if module is not None:
             with rare_collections():
@@ -127,7 +127,7 @@ def _command(name: str, value: Any, ctx: Any) -> Any:
 
 
 def _set_out(command: Any) -> None:
-    """Let examples end the help of a command, and of its own, and names alone tell arguments."""
+    """End the help of a command and its subcommands in examples; show arguments by name alone."""
     for parameter in command.params:
         if parameter.param_type_name == "argument":
             parameter.display_type_rich = lambda **_: ""

@@ -1,4 +1,4 @@
-"""What a command prints of a finished run: one JSON object, or sentences and a table of metrics."""
+"""The printed results of a finished run: one JSON object, or sentences and a table of metrics."""
 
 import json
 import os
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 _LOADED = time.perf_counter()
-# The width of units, whose words may go on in further lines.
+# The width of the column of units, whose words wrap.
 UNIT_WIDTH = 12
 LONGEST = 10_000  # characters of a line
 
@@ -27,7 +27,7 @@ def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
     """Print the results of a run: as one JSON object, as a table, or nothing.
 
     Raises:
-        ArtifactError: They can't be written; the run is stored nevertheless.
+        ArtifactError: The results can't be written; the run is stored nevertheless.
     """
     summary = summary_of(result)
     try:
@@ -35,7 +35,7 @@ def print_results(result: "Run", *, as_json: bool, quiet: bool) -> None:
             typer.echo(json.dumps(summary))
         elif not quiet:
             print_summary(summary, result)
-    except BrokenPipeError:  # its reader has seen enough
+    except BrokenPipeError:  # the reader of the pipe has closed it
         raise
     except OSError as error:
         raise ArtifactError(
@@ -90,7 +90,7 @@ def print_summary(summary: Mapping[str, Any], run: "Run") -> None:
     for block in blocks:
         columns = zip(*(row.values for row in block.rows), strict=True)
         value_width = sum(max(map(len, column)) + 2 for column in columns)
-        # Where columns would be cut, lines are as long as they are, and the terminal breaks them.
+        # Where columns would be cut, the terminal breaks the lines instead.
         is_narrow = console.width < width + 4 + value_width + UNIT_WIDTH
         table = Table.grid(padding=(0, 2, 0, 0))
         table.add_column(min_width=width + 2, no_wrap=True)
@@ -126,5 +126,5 @@ def _since_start() -> float:
         began_s = int(fields.split()[19]) / os.sysconf("SC_CLK_TCK")
         return time.clock_gettime(time.CLOCK_BOOTTIME) - began_s
     except (OSError, AttributeError, ValueError, IndexError):
-        # Not on Linux: the time since this module was loaded.
+        # Other systems than Linux only tell the time since this module was loaded.
         return time.perf_counter() - _LOADED

@@ -35,7 +35,7 @@ FIRST_S = 30.0
 
 @contextmanager
 def watched(first_s: float = FIRST_S) -> Iterator[None]:
-    """Print to stderr each component that runs longer than `first_s`, and the line it is at."""
+    """Print each component that runs longer than `first_s` to stderr, with its current line."""
     is_over = threading.Event()
     thread_id = threading.get_ident()
     thread = threading.Thread(
@@ -77,10 +77,10 @@ def _line(frame: FrameType | None) -> str:
 
 
 def run_with_progress(simulation: "Simulation", *, quiet: bool = False) -> "Run":
-    """Run to the end, and show the progress unless `quiet`.
+    """Run a simulation to the end, and show its progress unless `quiet`.
 
     Raises:
-        Exit: Ctrl-C or SIGTERM; what was simulated until then is stored.
+        Exit: Ctrl-C or SIGTERM; the run up to then is stored.
     """
     gc.freeze()  # loaded modules live to the end: the collector needn't scan them
     try:
@@ -145,10 +145,10 @@ def run(
 
 
 def report_wrong(simulation: "Simulation", *, strict: bool, quiet: bool = False) -> None:
-    """Print to stderr what will not work in a home, unless `quiet`.
+    """Print the problems of a home to stderr, unless `quiet`.
 
     Raises:
-        InputError: Something will not, and `strict` refuses that.
+        InputError: There is a problem, and `strict` refuses it.
     """
     from fleet2d.engine.simulation import flaws_of
 
@@ -162,16 +162,16 @@ def report_wrong(simulation: "Simulation", *, strict: bool, quiet: bool = False)
 def set_up(
     arguments: list[str] | None, seed: int | None, out: Path | None, **wrong: bool
 ) -> "Simulation":
-    """Return the simulation of a scenario and its changes, of which no step is done.
+    """Return the simulation of a scenario and its changes, before its first step.
 
     Args:
         arguments: The scenario, and changes to it.
         seed: The seed; None: that of the scenario.
         out: The directory of the run; None: a new one of the scenario's name.
-        wrong: What `report_wrong` takes.
+        wrong: The arguments of `report_wrong`.
 
     Raises:
-        InputError: Something of it is wrong.
+        InputError: The scenario or the directory is wrong.
     """
     with rare_collections():
         from fleet2d.engine.simulation import Simulation
@@ -206,7 +206,7 @@ def _fresh_directory(name: str) -> Path:
         directory = Path("runs") / f"{stem}-{number:03d}"
         refusal = os_errors_as(RunDirectoryError, f"{directory} can't be created", advice)
         with refusal, suppress(FileExistsError):
-            directory.mkdir(parents=True)  # at once, so that a parallel run takes the next
+            directory.mkdir(parents=True)  # at once, so that a parallel run takes the next number
             return directory
         number += 1
 

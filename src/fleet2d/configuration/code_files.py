@@ -1,6 +1,6 @@
-"""The files of users' own components: where a class is, and what its module imports, from the text.
+"""The files of users' own components: where a class is, and what its module imports.
 
-Nothing is run.
+Modules are parsed, and never run.
 """
 
 import ast
@@ -40,7 +40,7 @@ def package_of(folder: Path) -> str:
 
 
 def source_of(folder: Path, name: str) -> Path | None:
-    """Return the file with the source of a module in a folder, None if there is none."""
+    """Return the source file of a module in a folder, None if there is none."""
     path = folder.joinpath(*name.split("."))
     candidates = (path / "__init__.py", path.with_suffix(".py"))
     return next(filter(Path.is_file, candidates), None)
@@ -85,7 +85,7 @@ def _imports_of(file: Path, folder: Path) -> Iterator[Path]:
     try:
         imports = _imports_in(read_bytes(file, FILE_BYTES))
     except (OSError, InputError):
-        return  # it can't be imported either
+        return  # a file with wrong syntax can't be imported either
     for level, parts in imports:
         start = file.parents[level - 1] if 0 < level <= len(file.parents) else folder
         yield from files_of(start, parts)

@@ -9,8 +9,8 @@ algorithm, metric) is declared by the base class of all components of that kind:
     class Likelihood(Algorithm):
         period: Duration = timedelta(hours=1)
 
-Its name is in the table of `fleet2d.configuration.built_in`; an installed package has a table of
-its own, the group of entry points `fleet2d.KIND`.
+Its name is in the table of `fleet2d.configuration.built_in`; installed packages register theirs as
+entry points of the group `fleet2d.KIND`.
 """
 
 import importlib.util
@@ -111,10 +111,10 @@ def summary(cls: type) -> str:
 class DescribedModel(BaseModel):
     """A model whose JSON Schema takes the descriptions of its fields from docstrings.
 
-    A `description` of a field itself counts more.
+    A `description` of the field itself takes precedence.
     """
 
-    # To build the first validator loads modules that a home without scenario doesn't need.
+    # Building the first validator loads modules that a home without a scenario doesn't need.
     model_config = ConfigDict(defer_build=True)
 
     @classmethod
@@ -134,7 +134,7 @@ class DescribedModel(BaseModel):
         return result
 
 
-# What YAML takes for no text, so that a name couldn't be referred to without quotes.
+# YAML doesn't read these as text, so such a name would need quotes wherever it is used.
 _NO_TEXT = frozenset({"null", "true", "false"})
 
 
@@ -151,12 +151,12 @@ def _check_names(entries: Any) -> Any:
 
 
 def once(info: ValidationInfo, key: object, validate: Callable[[], T]) -> T:
-    """Return the validated form of what many entries name, such as a file: it is validated once.
+    """Return the validated form of a file or the like that many entries name; validate it once.
 
     Args:
-        info: Of the entry's validation, in whose context, if there is any, the result is kept.
-        key: What they name.
-        validate: Reads and validates it.
+        info: Information on the entry's validation; its context, if any, keeps the result.
+        key: Identifies the named thing.
+        validate: The function that reads and validates it.
 
     Raises:
         ValueError: It is invalid, which the first entry found; or all that was counted, which
@@ -181,14 +181,14 @@ def once(info: ValidationInfo, key: object, validate: Callable[[], T]) -> T:
 
 
 def count(info: ValidationInfo, bound: Bound, amount: int) -> None:
-    """Count what a scenario has of something, in the context of its validation, if there is any.
+    """Add an amount to the count of a bound, in the context of the validation, if there is any.
 
     Raises:
-        PydanticCustomError: It has more than the bound; only the first such error is shown.
+        PydanticCustomError: The count exceeds the bound; only the first such error is shown.
     """
     if info.context is None:
         return
-    amounts = info.context.setdefault(Counter, Counter())  # by bound
+    amounts = info.context.setdefault(Counter, Counter())  # amounts by bound
     amounts[bound] += amount
     with errors_as(partial(problem, group=bound.name)):
         bound.check(amounts[bound], "the scenario", prefix="at least ")
@@ -334,7 +334,7 @@ _NUMBERS = (int, float, int | None, float | None)
 
 
 def _refuse_early(data: Mapping[Any, Any], fields: Mapping[str, FieldInfo]) -> None:
-    """Refuse what Pydantic would accept, or would take very long to refuse.
+    """Refuse data that Pydantic would accept, or would take very long to refuse.
 
     Raises:
         ValidationError: True or false stands for a number, or a list has too many entries.
@@ -387,7 +387,7 @@ class Component(Settings):
     type_name: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Set the type name: that of a table, else the path of the class."""
+        """Set the type name: the name in a table, else the path of the class."""
         super().__init_subclass__(**kwargs)
         path = class_path(cls)
         cls.type_name = _NAMES.get(path, path)
@@ -428,7 +428,7 @@ def lookup(kind: str, name: str) -> type[Component]:
     installed ones. 'folder/package.module:Class' names the folder.
 
     Raises:
-        ScenarioError: there is none of that name, or it can't be imported, or is of another kind.
+        ScenarioError: There is no such component, it can't be imported, or it is of another kind.
     """
     if ":" in name:
         return _check_class(kind, name, import_class(name))
@@ -473,7 +473,7 @@ def _plugins(kind: str) -> "EntryPoints":
 
 def _name_of(cls: type[Component]) -> str:
     """Return the name of a class in a table, else its path."""
-    if ":" in cls.type_name and "/" not in cls.type_name:  # maybe one that was unpickled
+    if ":" in cls.type_name and "/" not in cls.type_name:  # the class may have been unpickled
         for entry in _plugins(cls.kind):
             if entry.value == cls.type_name:
                 cls.type_name = entry.name
@@ -481,7 +481,7 @@ def _name_of(cls: type[Component]) -> str:
 
 
 def _is_there(entry: "EntryPoint") -> bool:
-    """Return whether the module of an entry point exists; that of a limb may be taken away."""
+    """Return whether the module of an entry point exists; a limb may have been removed."""
     try:
         return importlib.util.find_spec(entry.module) is not None
     except ModuleNotFoundError:
@@ -605,9 +605,9 @@ def kind_at(form: Any, keys: Sequence[str], marks: Sequence[object] = ()) -> str
     """Return the kind of component that is configured at a path, None if there is none.
 
     Args:
-        form: What the path begins in: settings, or the annotation of a field.
-        keys: The path. What a component has within depends on its type: there are none there.
-        marks: What else declares the field.
+        form: The settings or the annotation of a field in which the path begins.
+        keys: The path. It doesn't enter components, whose keys depend on their types.
+        marks: The metadata of the field.
     """
     if get_origin(form) is Annotated:
         inner, *more = get_args(form)

@@ -29,7 +29,7 @@ class Loader(yaml.SafeLoader):
 
 
 class _FastLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """The same loader in C, if PyYAML was built with it."""
+    """The same loader in C, if PyYAML was built with libyaml."""
 
 
 Pair = tuple[yaml.ScalarNode, yaml.Node]
@@ -73,7 +73,7 @@ def _construct_timestamp(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> Any:
     try:
         return loader.construct_yaml_timestamp(node)
     except (ValueError, AttributeError):
-        return node.value  # such as 2026-02-31: text, which the model refuses
+        return node.value  # 2026-02-31 stays text, which the model refuses
 
 
 Loader.add_constructor(f"{TAG}int", _construct_int)
@@ -164,10 +164,10 @@ class _Builder:
     def __init__(
         self, folder: Path | None, title: str, places: dict[Keys, str] | None = None
     ) -> None:
-        """Start with no values.
+        """Start without values.
 
         Args:
-            folder: The folder of the text, which all texts in it get; None: they get none.
+            folder: The folder of the document, attached to all texts in it; None: to none.
             title: The name of the text in places.
             places: Where the place of each value is added; None: nowhere.
         """
@@ -273,7 +273,7 @@ class Document:
     places: dict[Keys, str] = field(default_factory=dict)
 
     def named(self, location: Location) -> str:
-        """Return the path of a key after its place, if that is known, as errors begin.
+        """Return the path of a key after its place, if known: the beginning of an error.
 
         Example:
             >>> Document(places={("users",): "home.yaml:4"}).named(("users", "bo"))
@@ -313,7 +313,7 @@ class Document:
 
 
 def _file(place: str) -> str:
-    """Return the file of a place like 'home.yaml:12', or the override that it is.
+    """Return the file of a place like 'home.yaml:12', or the whole text of an override.
 
     >>> _file("home.yaml:12"), _file("override 'simulation.seed=4'")
     ('home.yaml', "override 'simulation.seed=4'")

@@ -67,7 +67,7 @@ def import_class(name: str, *, is_plugin: bool = False) -> object:
             f"{did_you_mean(module_name, _modules(folder, module_name))}"
         )
     try:
-        if is_plugin:  # what lies beside the scenario under that name isn't meant
+        if is_plugin:  # a plugin isn't a module of that name beside the scenario
             module = importlib.import_module(module_name)
         else:
             module = _import_module(folder, module_name)
@@ -119,7 +119,7 @@ def _importable(folder: Path) -> Iterator[None]:
     current_folder = Path.cwd()
     writes_bytecode = sys.dont_write_bytecode
     sys.dont_write_bytecode = True
-    importlib.invalidate_caches()  # a file may be new
+    importlib.invalidate_caches()  # a file may have been written just now
     sys.path.insert(0, str(folder))
     _SEARCHED.append(folder)
     try:
@@ -143,7 +143,7 @@ def _is_beside(file: Path, folder: Path) -> bool:
 
 
 def public_name(text: str) -> str:
-    """Return a text with modules as users know them, without the package of their folder."""
+    """Return a text with modules named as users know them, without the package of their folder."""
     return re.sub(rf"\b{PREFIX}[0-9a-f]+(\.?)", lambda match: "" if match[1] else ".", text)
 
 
@@ -201,7 +201,7 @@ def source_files(cls: type) -> list[Path]:
         parts = (name if package in _FOLDERS else cls.__module__).split(".")
         return with_imports(files_of(folder, parts), folder)
     source = None
-    with suppress(TypeError, OSError):  # a class of an interactive session
+    with suppress(TypeError, OSError):  # a class of an interactive interpreter has no file
         source = inspect.getsourcefile(cls)
     return [Path(source)] if source and Path(source).is_file() else []
 
@@ -216,7 +216,7 @@ def class_path(cls: type) -> str:
     package, _, module = cls.__module__.partition(".")
     if package in _FOLDERS:
         return f"{_FOLDERS[package].as_posix()}/{module}:{cls.__qualname__}"
-    # A module that imports another one beside it: that one will be known by its folder, too.
+    # A module may import another one beside it, which then is found by this folder, too.
     file = getattr(sys.modules.get(cls.__module__), "__file__", None)
     if file and _SEARCHED and Path(file) in files_of(_SEARCHED[-1], cls.__module__.split(".")):
         _BESIDE[cls] = _SEARCHED[-1]

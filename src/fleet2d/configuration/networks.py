@@ -1,4 +1,4 @@
-"""Networks in ONNX files: they count as code, as one may compute for ever and fill the memory."""
+"""Networks in ONNX files, which count as code, since one may run for ever or fill the memory."""
 
 from collections.abc import Collection, Mapping
 from functools import lru_cache
@@ -20,10 +20,10 @@ def open_network(path: Path, inputs: Collection[str]) -> Any:
         inputs: The names that its inputs may have.
 
     Raises:
-        InputError: It is no such network, onnxruntime isn't installed, or the file may not run: a
-            stored run, or a scenario of others, names it, and the user doesn't trust it.
+        InputError: The file isn't such a network, onnxruntime isn't installed, or the file may not
+            run: an untrusted stored run or scenario of others names it.
     """
-    if path.suffix != NETWORK:  # by which it is listed as code
+    if path.suffix != NETWORK:  # files that run are listed by this suffix
         raise InputError(f"{path} is no ONNX model: its suffix isn't {NETWORK}")
     check_may_run(str(path), [path.resolve()])
     try:
@@ -40,7 +40,7 @@ def open_network(path: Path, inputs: Collection[str]) -> Any:
 
 @lru_cache(maxsize=8)
 def _session(path: Path, _: int) -> Any:
-    """Return the session of a file that was written at a time."""
+    """Return the session of a file; a later time of writing gives a new one."""
     with extra("onnx", "networks in ONNX files need onnxruntime"):
         import onnxruntime
     options = onnxruntime.SessionOptions()

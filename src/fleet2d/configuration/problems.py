@@ -69,7 +69,7 @@ def rewrite(
         context = line.get("ctx", {})
         details = InitErrorDetails(type=kind, loc=line["loc"], input=line["input"], ctx=context)
         if kind not in own_kinds:
-            # The message comes last: braces within it are not placeholders.
+            # The message is inserted last, so that braces within it are no placeholders.
             context = {key: context[key] for key in context if key != "message"}
             context["message"] = line["msg"]
             details["type"] = PydanticCustomError(kind, "{message}", context)
@@ -174,7 +174,7 @@ def shown(value: object) -> str:
     """
     if isinstance(value, str):
         return one_line(repr(str(value)))
-    # Of a huge number or a long list only the size.
+    # A huge number or a long list is shown by its size alone.
     if isinstance(value, int) and value.bit_length() > 200:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, list | tuple) and len(value) > 20:

@@ -1,6 +1,6 @@
-"""Which code may run: that of the user's own scenarios, and of stored runs that the user trusts.
+"""Trust: only the code of the user's own scenarios and of trusted stored runs may run.
 
-Whoever opens a stored run, study or data set decides once, for all code and programs that it names.
+The user who opens a stored run, study or data set decides once for all code and programs in it.
 """
 
 import shlex
@@ -34,7 +34,7 @@ class UntrustedCodeError(RunDirectoryError):
     """A stored run, study or data set has code of its own; the message lists all of it."""
 
     def __init__(self, text: str) -> None:
-        """Shorten nothing: what is left out could be what matters."""
+        """Keep the whole text: a part left out could be the one that matters."""
         Exception.__init__(self, text)
 
 
@@ -62,11 +62,11 @@ def stored_code(title: object, content: object, *, trust: bool) -> Iterator[None
 
     Args:
         title: The run or study, for the message.
-        content: Its scenario, with what was done to it; see `code_of`.
+        content: Its scenario and its interventions; see `code_of`.
         trust: Whether the user trusts it.
 
     Raises:
-        UntrustedCodeError: It names code, and isn't trusted; none has run.
+        UntrustedCodeError: The run names code, and isn't trusted; none has run.
     """
     code = [] if trust else code_lines(content)
     if code:
@@ -90,7 +90,7 @@ def check_may_run(name: str, code: Iterable[object]) -> None:
 
     Args:
         name: What names it, for the message.
-        code: The files or programs that would run; none: all of it is loaded already.
+        code: The files or programs that would run; empty: all code is loaded already.
 
     Raises:
         ScenarioError: It may not run.
@@ -115,7 +115,7 @@ def check_may_import(name: str, folder: Path, module: str) -> None:
 
 
 def content_of_run(manifest: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the scenario of a manifest with what was done to the run, for `code_of`."""
+    """Return the scenario of a manifest with the interventions of the run, for `code_of`."""
     return {**manifest["scenario"], "interventions": manifest.get("interventions", [])}
 
 
@@ -129,10 +129,10 @@ def code_lines(content: object) -> list[str]:
 
 
 def code_of(content: object) -> dict[str, list[str]]:
-    """Return what a scenario would run and isn't loaded, with the keys that name it.
+    """Return the code that a scenario would run and that isn't loaded, with the keys that name it.
 
-    That is: the files of its own components and what these import from beside them; programs with
-    all their arguments; networks; and files that it extends, which may name more.
+    This includes the files of its own components and those that they import from beside them;
+    programs with all arguments; networks; and extended files, which may name more code.
 
     Args:
         content: Plain data, such as the scenario of a manifest.
@@ -148,7 +148,7 @@ def code_of(content: object) -> dict[str, list[str]]:
 
 
 def _code_in(value: object, keys: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    """Yield the key and the code of each value that names some."""
+    """Yield the key and the code of each value that names code."""
     if isinstance(value, Mapping):
         if program := _program_of(value):
             yield ".".join((*keys, "command")), program
@@ -167,7 +167,7 @@ def _program_of(settings: Mapping[object, object]) -> str:
     command = settings.get("command")
     arguments = settings.get("arguments", ())
     if not isinstance(command, str) or not (path := _file(command)):
-        return ""  # no program, or one that can't be started
+        return ""  # a program that can't be started is no code
     rest = arguments if isinstance(arguments, list | tuple) else [arguments]
     return shlex.join(map(str, [path, *rest]))
 
@@ -177,7 +177,7 @@ def _file(text: str) -> Path | None:
     try:
         path = (folder_of(text) / Path(text).expanduser()).resolve()
         return path if path.is_file() else None
-    except (OSError, ValueError, RuntimeError):  # it is no path
+    except (OSError, ValueError, RuntimeError):  # not a path
         return None
 
 
@@ -185,7 +185,7 @@ def _files_named(text: str, *, is_extended: bool) -> Sequence[Path]:
     """Return the files of code that a text would run."""
     if is_extended and (file := _file(text)):
         return [file]
-    if text.endswith(NETWORK):  # it may compute for ever, and fill the memory
+    if text.endswith(NETWORK):  # a network may run for ever, or fill the memory
         return [(folder_of(text) / Path(text).expanduser()).resolve()]
     if not is_class_path(text):
         return []
@@ -193,15 +193,15 @@ def _files_named(text: str, *, is_extended: bool) -> Sequence[Path]:
     try:
         files = files_to_run((folder_of(text) / folder).resolve(), module)
     except (OSError, ValueError):
-        return []  # it is not a path: the import will fail
-    is_bundled = text.startswith("bundled:")  # a scenario that comes with Fleet2D
+        return []  # this isn't a path: the import will fail
+    is_bundled = text.startswith("bundled:")  # scenarios of Fleet2D itself are trusted
     return [] if is_bundled and not any(file.is_file() for file in files) else files
 
 
 def files_to_run(folder: Path, name: str) -> list[Path]:
     """Return the files that importing a module would run, unless it is loaded already.
 
-    For a module that doesn't exist it is the file that the module would have.
+    For a module that doesn't exist, return the file that it would have.
 
     Args:
         folder: The folder in which it is searched first.

@@ -58,8 +58,8 @@ def named_path(name: str | Path) -> Path:
     """Return the path of an input file; a relative one starts from the folder of its text.
 
     Raises:
-        PydanticCustomError: It leads out of the root of input files, no file can have such a name,
-            or it begins with the home of an unknown user.
+        PydanticCustomError: The path leads out of the root of input files, no file can have such a
+            name, or it begins with the home of an unknown user.
     """
     with errors_as(problem, of=(InputError, RuntimeError)):
         path = folder_of(name) / Path(name).expanduser()
@@ -103,7 +103,7 @@ def parse_peer_address(text: str) -> SplitResult:
     """Read the address of another program, `scheme://host:port`.
 
     Raises:
-        PydanticCustomError: There is no such scheme, host or port.
+        PydanticCustomError: The scheme is unknown, or the host or the port is missing.
 
     Example:
         >>> parse_peer_address("mqtt://nas:1883/lab").port
@@ -117,7 +117,7 @@ def parse_peer_address(text: str) -> SplitResult:
     else:
         is_known = parts.scheme in PEER_SCHEMES
         is_plain = not {"#", "+", "?"} & set(text.rpartition("@")[2])
-        has_host = parts.netloc or parts.scheme == "ros2"  # whose router is on this machine
+        has_host = parts.netloc or parts.scheme == "ros2"  # the router of ros2 is on this machine
         if is_known and has_host and is_plain:
             return parts
         wrong = did_you_mean(parts.scheme, PEER_SCHEMES)
@@ -139,7 +139,7 @@ PeerAddress = Annotated[str, AfterValidator(_checked_peer_address)]
 
 
 MAX_DURATION = timedelta(days=365_250)  # 1000 years: microseconds stay far inside int64
-# A number has at most so many digits, as fractions with very many would fill the memory.
+# Fractions with more digits could fill the memory.
 MAX_DIGITS = 400
 MICROSECOND = timedelta(microseconds=1)
 
@@ -158,7 +158,7 @@ class Quantity:
         base: Its base unit.
         units: The size of its units in base units, by spelling.
         examples: Values.
-        asked: The units to choose from if a number has none; without, it is in the base unit.
+        asked: The units that an error about a bare number lists; empty: it is in the base unit.
     """
 
     name: str
@@ -171,7 +171,8 @@ class Quantity:
         """Return the exact value in base units of a number, a text, or a mapping {unit: number}.
 
         Raises:
-            PydanticCustomError: it can't be read; the message shows how the quantity is written.
+            PydanticCustomError: The value can't be read; the message shows how the quantity is
+                written.
         """
         if isinstance(value, str):
             return self._parse_text(value)
@@ -207,7 +208,7 @@ class Quantity:
         if isinstance(value, bool) or not isinstance(value, Real | Decimal):
             raise self._unreadable(source)
         try:
-            # By repr, 0.1 is one tenth, not the nearest binary fraction.
+            # With repr, 0.1 is one tenth, not the nearest binary fraction.
             exact = value if isinstance(value, Decimal) else Decimal(repr(float(value)))
         except OverflowError:
             exact = Decimal("Infinity")
@@ -324,7 +325,7 @@ def whole_steps(
         error: The type of the exception.
 
     Raises:
-        ScenarioError: It is not a multiple, or 0; an exception of the type `error`.
+        ScenarioError: The duration isn't a multiple of the step, or is 0; of the type `error`.
 
     >>> whole_steps(timedelta(minutes=1), 500_000, "period")
     120
@@ -345,8 +346,8 @@ def parse_duration(value: object) -> timedelta:
     True
 
     Raises:
-        PydanticCustomError: not a duration, without a unit, negative, too long, or shorter than a
-            microsecond.
+        PydanticCustomError: The value is no duration, has no unit, or is negative, too long, or
+            shorter than a microsecond.
     """
     if not isinstance(value, timedelta):
         seconds = DURATION.parse(value)
@@ -389,7 +390,7 @@ def parse_time_of_day(value: object) -> timedelta:
     datetime.timedelta(seconds=27000)
 
     Raises:
-        PydanticCustomError: not a time of day.
+        PydanticCustomError: The value is no time of day.
     """
     if isinstance(value, time) and value.tzinfo is None:
         value = value.isoformat()
@@ -430,7 +431,7 @@ def _to_float(quantity: Quantity) -> BeforeValidator:
 
 
 def limited_to(is_valid: Callable[[Any], bool], expected: str) -> AfterValidator:
-    """Return what refuses values of a quantity that aren't valid; `expected` says which are."""
+    """Return a validator that refuses invalid values; `expected` says which are valid."""
 
     def check(value: Any) -> Any:
         if not is_valid(value):

@@ -1,1 +1,1 @@
-"""Reading runs back: their tables, the way of each body, moments, layers."""
+"""Reading runs back: their tables, the path of each body, moments, layers."""

@@ -1,4 +1,4 @@
-"""Reading the layers of a run back."""
+"""Read the layers of a run back."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ def layer_steps(run: Run, name: str) -> list[int]:
         ArtifactError: The run stored no such layer.
     """
     table = _layer_table(run, name)
-    begins = table["row"].to_numpy() == ALL_CELLS  # the first row of each step
+    begins = table["row"].to_numpy() == ALL_CELLS  # each step has one such row first
     return table["step"].to_numpy()[begins].tolist()
 
 
@@ -36,7 +36,7 @@ def read_layer(run: Run, name: str, step: int | None = None) -> NDArray[Any]:
         step: One of `layer_steps`; None for the last.
 
     Raises:
-        ArtifactError: The run stored no such layer, or not at that step, or it is damaged.
+        ArtifactError: The run stored no such layer, or not at that step, or the layer is damaged.
     """
     steps = layer_steps(run, name)
     if not steps:

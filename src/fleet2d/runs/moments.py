@@ -1,4 +1,4 @@
-"""Moments and parts of a run: times in words as steps, and who was where between two steps."""
+"""Moments and parts of a run: steps from times in words, and positions between two steps."""
 
 import re
 from contextlib import suppress
@@ -181,7 +181,7 @@ def expand_walks(run: Run) -> Any:
     interval = timedelta(microseconds=run.manifest["step_us"])
     parts = [table.take(np.flatnonzero(~np.isin(entity, walkers)))]
     parts += [positions(run, name, interval) for name in walkers]
-    # With plain strings and without metadata.
+    # Plain strings without metadata are the form of a new table.
     texts = {"entity": pa.string(), "kind": pa.string()}
     fields = [(field.name, texts.get(field.name, field.type)) for field in table.schema]
     schema = pa.schema(fields)

@@ -1,4 +1,4 @@
-"""The log of a robot, as its own would be: what it decided, did, perceived, and what failed."""
+"""The log of a robot, like one that it wrote itself: decisions, moves, sightings and failures."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import timedelta
@@ -59,12 +59,12 @@ _LEVELS = {
         WARN,
     ),
 }  # fmt: skip
-# Why a robot goes off without anybody wanting it.
+# For these reasons a robot goes off without anybody wanting it.
 _UNWANTED = frozenset({"crash", "empty"})
-# What the robot can't notice: deceived cameras, and what is done to it from outside.
+# A robot can't notice deceived cameras, nor other interventions than these.
 _FAULTS = frozenset({"fault", "switch_off"})
 _FIELDS_OF_RECORDS = frozenset({"do", "step", "entity", "by", "duration"})
-# The order at one step: what a decision is about comes before it, what comes of it after it.
+# Sources in order within a step: causes of a decision come before it, its effects after it.
 _ORDER = ("power", "fault", "place", "sight", "decision")
 # A move shorter than this is a turn on the spot [m].
 LEAST_MOVE_M = 0.05
@@ -78,7 +78,7 @@ class LogEntry(NamedTuple):
         level: INFO, WARN or ERROR.
         source: The part of the robot that writes it: a name in `SOURCES`, `decision`, `drive`,
             `fault` or `task`.
-        text: What it says.
+        text: The message.
     """
 
     step: int
@@ -92,8 +92,8 @@ class Move(NamedTuple):
 
     Attributes:
         first: The step at which it begins.
-        end: The step at which it rests again.
-        metres: The length of its way [m].
+        end: The step at which the body rests again.
+        metres: The length of the path [m].
         begins_in: The room where it begins; empty outside of rooms.
         ends_in: The room where it ends.
     """
@@ -110,8 +110,8 @@ def robot_log(
 ) -> list[LogEntry]:
     """Return the log of a robot for the steps from `first` to `end` - 1, in order.
 
-    It has what the robot could know: its own decisions, events and faults. Rooms are those where it
-    is, not where it believes to be.
+    The log has only what the robot could know: its own decisions, events and faults. Rooms are
+    those where the robot is, not where it believes itself to be.
 
     Args:
         run: A stored run.
@@ -137,7 +137,7 @@ def robot_log(
     table = run.tables.get("decisions", decisions)
     if table is not None:
         entries += _of_decisions(rows_of(table, robot, first, end))
-    # From the start of the run on: when it went off may be before.
+    # The robot may have gone off before `first`, so read from the start of the run.
     events = _of_events(rows_of(run.tables["events"], robot, 0, end), run.clock)
     entries += (entry for entry in events if entry.step >= first)
     entries += _of_faults(run.manifest["interventions"], robot, first, end)
@@ -148,7 +148,7 @@ def robot_log(
 
 
 def _rank(entry: LogEntry) -> tuple[int, int]:
-    """Return by what the lines of a log are sorted."""
+    """Return the key by which the lines of a log are sorted."""
     is_ranked = entry.source in _ORDER
     return entry.step, _ORDER.index(entry.source) if is_ranked else len(_ORDER)
 
@@ -195,7 +195,7 @@ def moves_of(run: Run, name: str, first: int, end: int) -> Iterator[Move]:
     step = timedelta(microseconds=run.clock.step_us)
     rooms = [*(room.name for room in run.plan.rooms), ""]
     steps_of_day = max(1, DAY_US // run.clock.step_us)
-    last: Move | None = None  # it may go on in the next part
+    last: Move | None = None  # a move may go on in the next part
     for begin in range(first, end, steps_of_day):
         way = reader.read(begin, min(begin + steps_of_day + 1, end), step)
         legs = np.hypot(np.diff(way.x), np.diff(way.y))
@@ -238,7 +238,7 @@ def decision_text(row: Mapping[str, Any]) -> str:
 
 
 def _of_decisions(rows: Iterable[Mapping[str, Any]]) -> Iterator[LogEntry]:
-    """Yield a line for each decision that isn't as the one before."""
+    """Yield a line for each decision that differs from the one before."""
     last = ""
     for row in rows:
         text = decision_text(row)
@@ -267,7 +267,7 @@ def _of_events(rows: Iterable[Mapping[str, Any]], clock: Clock) -> Iterator[LogE
 def _of_faults(
     records: Iterable[Mapping[str, Any]], robot: str, first: int, end: int
 ) -> Iterator[LogEntry]:
-    """Yield a line for each part of the robot that failed, as the manifest has it."""
+    """Yield a line for each fault of the robot in the manifest."""
     for record in records:
         is_own = record.get("entity") == robot and record["do"] in _FAULTS
         if is_own and first <= record.get("step", 0) < end:

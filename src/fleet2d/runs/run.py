@@ -97,13 +97,13 @@ class Run:
         self._plan: FloorPlan | None = None
 
     def __repr__(self) -> str:
-        """Return the run's place, status and tables."""
+        """Show the run's directory, status and tables."""
         place = "in memory" if self.directory is None else str(self.directory)
         return f"<Run {place}: {self.status}, tables {', '.join(self.tables)}>"
 
     @property
     def status(self) -> str:
-        """Its status: complete, interrupted, failed, or running (still, or until it crashed)."""
+        """The status: complete, interrupted, failed, or running (still, or until a crash)."""
         return str(self.manifest["status"])
 
     @property
@@ -113,7 +113,7 @@ class Run:
 
     @property
     def clock(self) -> Clock:
-        """Its steps and their local times."""
+        """The steps of the run and their local times."""
         manifest = self.manifest
         return Clock(start_of(manifest), manifest["step_us"], manifest["steps"])
 
@@ -124,7 +124,7 @@ class Run:
 
     @property
     def plan(self) -> FloorPlan:
-        """The floor plan that it ran in.
+        """The floor plan that the run took place in.
 
         Raises:
             ArtifactError: The run directory holds none.
@@ -150,10 +150,10 @@ class Run:
         self._plan = plan
 
     def running_code(self) -> AbstractContextManager[None]:
-        """Return a context in which its code may run if it is trusted, as to repeat the run.
+        """Return a context in which the code of a trusted run may run, for example to repeat it.
 
         Raises:
-            UntrustedCodeError: It has code of its own, and isn't trusted.
+            UntrustedCodeError: The run has code of its own, and isn't trusted.
         """
         title = self.directory or "the run"
         return stored_code(title, content_of_run(self.manifest), trust=self.trust)
@@ -232,7 +232,7 @@ class Run:
         return changes if run_digest(digests) == self.digest else [*changes, FILE_NAME]
 
     def _digest_of(self, name: str) -> str | None:
-        """Return the present digest of a table, None if it can't be read."""
+        """Return the present digest of a table, None if the table can't be read."""
         try:
             if self.directory is not None:
                 return record_of_file(path_in(self.directory, f"{name}.parquet")).digest
@@ -249,8 +249,8 @@ def open_run(directory: Path | str, *, trust: bool = False) -> Run:
 
     Args:
         directory: The run directory.
-        trust: Whether its own code and programs may run when it is repeated, as by `judge`;
-            to read it, none is needed.
+        trust: Whether its own code and programs may run when it is repeated, as by `judge`; reading
+            runs no code.
 
     Raises:
         RunDirectoryError: There is no run in that directory, or its manifest is damaged.
@@ -319,7 +319,7 @@ def _is_at(path: Path, root: Path) -> bool:
     """Whether a path still leads to a directory: components may have changed the current one."""
     try:
         return path.absolute() == root
-    except OSError:  # there is no current directory any more
+    except OSError:  # the current directory no longer exists
         return False
 
 

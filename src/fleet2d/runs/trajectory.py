@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from fleet2d.floorplan.home import Home
     from fleet2d.runs.run import Run
 
-# The sections of a scenario that bodies depend on; the components of all others are not imported.
+# Bodies depend on these sections of a scenario; components of others are not imported.
 _BODIES = ("simulation", "floorplan", "users", "robots")
 
 
@@ -72,7 +72,7 @@ def rebuild_path(run: "Run", plan: FloorPlan, entity: str, every: timedelta) -> 
 
     Args:
         run: A run that stored key frames.
-        plan: The floor plan it ran in.
+        plan: The floor plan that the run took place in.
         entity: The name of the body.
         every: Time between two poses, a multiple of the step.
 
@@ -134,7 +134,7 @@ class PathReader:
         before = -(-first // stride)  # the number of poses before the first one
         steps = np.arange(before * stride, end, stride, dtype=np.int64)
         out = empty_poses(len(steps))
-        out.x[:] = -1  # outside of the plan: what damaged key frames leave out
+        out.x[:] = -1  # a place outside of the plan marks what damaged key frames leave out
         with _damage():
             for key, last_key, begin, stop in self._segments:
                 low = -(-begin // stride) - before
@@ -175,7 +175,7 @@ class PathReader:
         state = Pose(*(int(keys[name][begin]) for name in Pose._fields))
         poses = empty_poses(stop - step + 1)
         trace_meander(home.barriers, actor.space.mesh, behavior.rule, step, state[:3], poses)
-        # The stored end of the walk; a walk without a step ended as the body was put elsewhere.
+        # A walk without a step ended because the body was put elsewhere; others have a stored end.
         if begin + 1 < len(keys["x"]) and stop > step:
             last = (poses.x[-1], poses.y[-1], poses.heading[-1])
             stored = tuple(keys[name][begin + 1] for name in ("x", "y", "heading"))
@@ -194,7 +194,7 @@ class PathReader:
 
 @contextmanager
 def _damage() -> Iterator[None]:
-    """Raise an ArtifactError for what damaged key frames cause."""
+    """Raise an ArtifactError for errors that damaged key frames cause."""
     try:
         yield
     except (KeyError, ValueError, OverflowError, IndexError, MemoryError) as error:
@@ -253,7 +253,7 @@ def _walker(
 ) -> "tuple[Home, Actor, Meander]":
     """Return the home, the body and its behavior that repeats its random walk."""
     sections = run.manifest["scenario"]
-    from fleet2d.entities.behavior import Actor  # few paths need a walker
+    from fleet2d.entities.behavior import Actor  # few paths have walks
     from fleet2d.entities.meander import Meander
     from fleet2d.floorplan.home import Home
     from fleet2d.scenario.load import load_scenario

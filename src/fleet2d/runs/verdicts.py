@@ -1,4 +1,4 @@
-"""What became of a run's expectations, in a few words: the first thing to say of it."""
+"""Verdicts on a run's expectations, in a few words: a report of a run begins with them."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -19,8 +19,8 @@ class ExpectationVerdict(NamedTuple):
 
     Attributes:
         name: Its name.
-        outcome: What became of it; `not decided` if it held as far as the run came.
-        says: A sentence about it.
+        outcome: The outcome; `not decided` if it held as far as the run came.
+        says: A sentence about the outcome.
         step: The first step of its first violation; None if it isn't violated.
     """
 

@@ -26,7 +26,7 @@ def compose(
     overrides: Iterable[str] = (),
     settings: Mapping[Keys, Any] | None = None,
 ) -> Document:
-    """Compose a scenario from a file (None: the bundled family) or a mapping, and overrides of it.
+    """Compose a scenario from a file (None: the bundled family) or a mapping, and its overrides.
 
     Mappings are merged, all other values replaced. Where a ``type`` changes, the fields of the old
     type are dropped. All overrides and settings are one change, applied after the files.
@@ -118,7 +118,7 @@ def _load(
             result = merge(result, _load(str(parent), folder, chain, sizes))
     except ScenarioError as error:
         raise ScenarioError(f"{document.named(('extends',))}: {error}") from error
-    # A scenario doesn't inherit the name of the one that it extends: runs are stored under it.
+    # Runs are stored under the name of their scenario, so an extending scenario doesn't inherit it.
     result.places.pop(("name",), None)
     result.data.pop("name", None)
     _refuse_unknown_deletions(result, document)
@@ -202,7 +202,7 @@ class _Merger:
     def replace(self, value: Any, keys: Keys, old: Any = None) -> Any:
         self.forget(old, keys)
         depth = len(keys)
-        # The place of the key or the nearest key around it; none: a value from Python.
+        # The place is that of the nearest key around this one; values from Python have none.
         nearest = (self.new_places.get(keys[:n]) for n in range(depth, -1, -1))
         self.places[keys] = next((place for place in nearest if place is not None), "")
         for inner in _paths_in(value, keys):
@@ -219,7 +219,7 @@ class _Merger:
     ) -> dict[str, Any]:
         """Return ``base`` without the fields of its type, if the change selects another type."""
         old_fields: set[str] = set()
-        if "behaviors" in change and "type" in base:  # from the short form to the long one
+        if "behaviors" in change and "type" in base:  # the short form becomes the long one
             old_fields = {"type", *_type_fields(kind, base["type"])}
         elif "type" in change:
             # The type of an algorithm or a metric may be given by its name.
@@ -244,7 +244,7 @@ def _paths_in(value: Any, keys: Keys) -> Iterator[Keys]:
 
 
 def _unfold(value: Any, other: Any) -> Any:
-    """Return a bare type name as a mapping if the other value is a mapping."""
+    """Turn a bare type name into a mapping if the other value is a mapping."""
     return {"type": value} if isinstance(value, str) and isinstance(other, Mapping) else value
 
 
@@ -257,7 +257,7 @@ def _class_of(kind: str, name: Any) -> type[Component] | None:
 
 def _is_same_class(kind: str, one: Any, other: Any) -> bool:
     """Return whether two names of types stand for one class."""
-    if one == other:  # without the class, which may be the user's code
+    if one == other:  # loading the class may run the user's code
         return True
     cls = _class_of(kind, one)
     return cls is not None and cls is _class_of(kind, other)

@@ -1,4 +1,4 @@
-"""Loading a scenario: composed, checked as a whole, and messages about what is wrong in one."""
+"""Loading of scenarios: composition, validation of the whole, and messages about errors."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -33,8 +33,8 @@ def load_scenario(
     """Load a scenario, change it, and check all of it.
 
     Args:
-        source: a YAML file, 'bundled:NAME', a mapping or a scenario; None, or an override in
-            its place: the bundled family.
+        source: a YAML file, 'bundled:NAME', a mapping or a scenario; if it is None or an override,
+            the bundled family.
         overrides: texts like 'simulation.duration.days=60', the value in YAML.
         settings: keys of ``simulation`` (``seed=4``) or whole sections (``name="night"``).
 
@@ -162,7 +162,7 @@ def explain(error: ValidationError, document: Document) -> ScenarioError:
 
 
 def describe(*lines: ErrorDetails) -> str:
-    """Return what is wrong with one value, from the errors of all types that it may have."""
+    """Return one message about a value from the errors of all types that it may have."""
     texts: list[str] = []
     expected: list[str] = []
     choices: list[str] = []
@@ -194,7 +194,7 @@ def describe(*lines: ErrorDetails) -> str:
 
 
 def _right_form(value: Any, expected: Sequence[str]) -> str:
-    """Return how to write a value of another form; empty if that isn't known."""
+    """Return advice on the right form of a value; empty if there is none."""
     if "text" in expected and isinstance(value, int | float | date):
         return ": put it in quotes, as it is written"
     if expected == ["a list"] and isinstance(value, str):
@@ -206,7 +206,7 @@ def _right_form(value: Any, expected: Sequence[str]) -> str:
 
 
 def _type_with_key(line: ErrorDetails, location: Location, data: Any) -> str:
-    """Return which types have an unknown key of a component, and what to do; empty if none has."""
+    """Return which types have an unknown key of a component, with advice; empty if none has."""
     *parents, key = map(str, location or ("",))
     if line["type"] == "unknown_key" and not parents:
         entries = {name: data.get(name) for name in data if isinstance(data[name], Mapping)}
@@ -240,7 +240,7 @@ def _quote(value: Any) -> str:
 
 
 def _location_in(line: ErrorDetails, data: Any) -> Location:
-    """Return a location without what pydantic adds: the member of a union, and '[key]'."""
+    """Return a location without pydantic's additions: the member of a union, and '[key]'."""
     location = line["loc"]
     for depth, key in enumerate(location):
         try:

@@ -52,7 +52,7 @@ from fleet2d.runtime.clock import Clock, Sun
 from fleet2d.runtime.local_time import Zone, rules_of, span_us, zone_of
 from fleet2d.sight.camera import SightSettings
 
-# What expectations call people by, and sightings, results and messages somebody not known.
+# Expectations call people by these words, and `unknown` stands for somebody not recognized.
 WORDS_FOR_PEOPLE = ("anyone", "everyone", "nobody", "unknown")
 
 
@@ -95,7 +95,7 @@ def _parse_local_time(value: Any) -> Any:
 def _refuse_file_as_type(value: Any) -> Any:
     """Refuse the name of a file in place of a floor plan's type, with advice on how to read it."""
     name = value.get("type") if isinstance(value, Mapping) else value
-    if not isinstance(name, str) or Path(name).suffix == "" or ":" in name:  # a type
+    if not isinstance(name, str) or Path(name).suffix == "" or ":" in name:  # this is a type
         return value
     from fleet2d.floorplan.load import advise_type  # few scenarios need it
 
@@ -120,7 +120,7 @@ class Daylight(Settings):
 class TimeZone(Settings):
     """The time zone of a home; short form: its name, like Europe/Berlin.
 
-    A stored run has its offsets, too: they count in place of this machine's rules.
+    A stored run also has the offsets, which then replace this machine's rules.
 
     Attributes:
         name: Its name.
@@ -214,7 +214,7 @@ class SimulationSettings(Settings):
     def _check_time_zone(self, time_zone: TimeZone) -> None:
         """Refuse an unknown time zone, and a start that its clock never reads."""
         try:
-            rules_of(time_zone.name)  # also if it has offsets: those who read its tables need them
+            rules_of(time_zone.name)  # readers of the tables need them even if offsets are stored
             zone = time_zone.zone(self.start, self.start)
         except KeyError:
             from zoneinfo import available_timezones
@@ -366,7 +366,7 @@ class Scenario(Settings):
                 yield ("script", number), entry.at
 
     def set_origin(self, folder: Path, document: Document) -> None:
-        """Keep the folder of the file that it was read from, and the places of its keys."""
+        """Keep the folder of the scenario's file, and the places of its keys."""
         self._folder = folder
         self._document = document
 

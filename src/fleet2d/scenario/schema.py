@@ -1,4 +1,4 @@
-"""The format of scenarios: a JSON Schema for editors, a list of components for people."""
+"""The format of scenarios: a JSON Schema for editors, and a list of components for readers."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,7 +24,7 @@ class _SchemaGenerator(GenerateJsonSchema):
         """Return the schema of a field with its default dumped as the field's type does."""
         result = super().default_schema(schema)
         if "default" in result:
-            # A default that can't be dumped stays as it is, such as one that is yet to be parsed.
+            # A default that can't be dumped, such as one not parsed yet, stays as it is.
             with suppress(SchemaError, PydanticSerializationError):
                 default = self.get_default_value(schema)
                 result["default"] = SchemaSerializer(schema).to_python(default, mode="json")
@@ -43,7 +43,7 @@ class FieldDescription:
 
 @dataclass(frozen=True)
 class ComponentDescription:
-    """A component and its configuration: its own keys, and who describes those that it shares."""
+    """A component and its configuration: its own keys, and who describes the inherited ones."""
 
     kind: str
     type: str
@@ -98,8 +98,8 @@ def _classes() -> dict[type[Settings], tuple[str, str]]:
 def _definitions(classes: Iterable[type[Settings]]) -> dict[str, Any]:
     """Return the schemas of settings and of a scenario by the names of their classes.
 
-    Keys that several classes inherit are in the schema of the class that declares them, to which
-    theirs refer.
+    Inherited keys are in the schema of the class that declares them; those of its heirs refer to
+    it.
     """
     models: list[type[BaseModel]] = [Scenario, *classes]
     _, content = models_json_schema(
