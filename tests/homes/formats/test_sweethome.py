@@ -273,3 +273,13 @@ def test_an_archive_that_unpacks_to_gigabytes_is_refused(tmp_path):
 
     with pytest.raises(FloorPlanError, match=r"Home\.xml has at least 67,?108,?865 bytes"):
         load_floorplan(tmp_path / "bomb.sh3d")
+
+
+def test_a_room_whose_outline_goes_back_on_itself_is_there(tmp_path):
+    outline = [(0, 0), (400, 0), (500, 0), (400, 0), (400, 300), (0, 300)]
+    points = "".join(f'<point x="{x}" y="{y}"/>' for x, y in outline)
+
+    plan = load_floorplan(write(tmp_path, f'<room name="Kitchen">{points}</room>'))
+
+    areas = {room.name: room.area_m2 for room in plan.rooms}
+    assert areas == pytest.approx({"Kitchen": 12.0}, abs=0.1)

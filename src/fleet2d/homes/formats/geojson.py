@@ -401,7 +401,10 @@ def _shift(bounds: F64, notes: list[str]) -> Move:
     if np.abs(bounds).max() <= MAX_COORDINATE_M / 10:
         return lambda xy: xy
     corner = np.floor(bounds[:2])
-    notes.append(f"its coordinates count from ({corner[0]:.0f}, {corner[1]:.0f}) m here")
+    notes.append(
+        f"its coordinates count from ({corner[0]:.0f}, {corner[1]:.0f}) here; they are in metres,"
+        " unless scale: says another unit, such as 0.3048 for feet"
+    )
     return lambda xy: np.round(xy - corner, 6)
 
 

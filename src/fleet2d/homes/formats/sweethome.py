@@ -18,6 +18,7 @@ from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.file_source import FileSource
 from fleet2d.floorplan.files import MAX_COORDINATE_M, in_file, reading
 from fleet2d.floorplan.furniture import FURNITURE, measured_height
+from fleet2d.floorplan.mesh import repair
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.floorplan.rooms.room import room_type
 from fleet2d.homes.formats.features import Draft, Feature
@@ -135,8 +136,9 @@ def _features(element: ET.Element) -> Iterator[Feature]:
         yield Feature("stairs", where, _box(element), {}, level)
     elif element.tag == "room":
         corners = _metres((_number(p, "x"), _number(p, "y")) for p in element.iter("point"))
-        if len(corners) > 2 and Polygon(corners).is_valid:
-            yield Feature("room", where, Polygon(corners), properties, level)
+        area = repair(Polygon(corners)) if len(corners) > 2 else Polygon()
+        if not area.is_empty:
+            yield Feature("room", where, area, properties, level)
     elif element.tag == "wall":
         ends = _metres(
             (_number(element, f"x{end}"), _number(element, f"y{end}")) for end in ("Start", "End")
