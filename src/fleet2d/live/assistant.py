@@ -361,11 +361,12 @@ class Workspace:
                 with errors_as(InputError, of=PydanticCustomError):
                     passed = parse_duration(until)
                 run.advance(round(passed.total_seconds() * 1e6 / run.clock.step_us))
+        news = run.events(since)[-50:]
         return {
             "time": run.time.isoformat(),
             "done": run.done,
             "state": run.state,
-            "events": [[e.step, e.entity, str(e.event), e.detail] for e in run.events(since)][-50:],
+            "events": [[e.step, e.entity, str(e.event), e.detail] for e in news],
         }
 
     @confined

@@ -335,7 +335,9 @@ class StudyAnswers:
 
         frame = self.with_metric(metric)
         values = frame[metric]
-        total = float(((values - values.mean()) ** 2).sum()) if len(values) else 0.0
+        total = 0.0
+        if len(values):
+            total = float(((values - values.mean()) ** 2).sum())
         drawn = [c for c in self.meta.features if c not in self.populations]
         varying = [c for c in self.columns if c not in drawn and frame[c].n_unique() > 1]
         rows: list[tuple[str, float]] = []

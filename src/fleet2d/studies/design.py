@@ -379,7 +379,8 @@ def build_design(
         base = Document({**base.data, "users": {}}, base.places)
     rules = []
     for i, rule in enumerate(file.rules):
-        place = ", ".join(filter(None, (f"rules.{i}", specification.places.place(("rules", i)))))
+        line = specification.places.place(("rules", i))
+        place = ", ".join(filter(None, (f"rules.{i}", line)))
         rules.append(RulePlan(rule.when, _change(rule.set.items(), place)))
     base = merge(base, _artifacts(file.keep.tables))
     seeds = file.replicates or (0 if file.fleet else _base_seed(base),)
@@ -429,7 +430,8 @@ def _check_first_life(design: Design) -> None:
     Raises:
         ScenarioError: A scenario of the first life is wrong.
     """
-    for index in range(0, min(len(design), TRIED_FIRST * len(design.seeds)), len(design.seeds)):
+    seeds = len(design.seeds)
+    for index in range(0, min(len(design), TRIED_FIRST * seeds), seeds):
         design.scenario(index)
 
 

@@ -236,8 +236,10 @@ class Draw:
     def files(self) -> list[Path]:
         """The table, and the files that it names, such as logs."""
         table = self._settings.table
+        if table is None:
+            return []
         named = {str(v) for row in self._rows for key, v in row.items() if "." in key}
-        return [] if table is None else [table, *filter(_is_file, map(Path, sorted(named)))]
+        return [table, *filter(_is_file, map(Path, sorted(named)))]
 
     @property
     def notes(self) -> list[str]:

@@ -261,8 +261,9 @@ class _Suite:
         for each, key in [(t, k) for t in failing for k in _to_see(gate, t)[:most]]:
             if key in self.files:
                 continue
-            test = next(n for n, test in enumerate(self.tests) if test.name == each.test)
-            task = SuiteTask(0, 0, "", "", key, test, 0, self.keys[each.test].index(key))
+            names = [test.name for test in self.tests]
+            trial = self.keys[each.test].index(key)
+            task = SuiteTask(0, 0, "", "", key, names.index(each.test), 0, trial)
             directory = folder / run_name(key)
             try:
                 result = job.run(task, directory)

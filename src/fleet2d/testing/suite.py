@@ -421,7 +421,9 @@ def outcomes_of(
         if each.verdict is not None
     ]
     others = [failure for failure in result.failures if failure.verdict is None]
-    outcomes += [TrialOutcome(f.name, None if f.untested else False, True, f.text) for f in others]
+    for each in others:
+        holds = None if each.untested else False
+        outcomes.append(TrialOutcome(each.name, holds, True, each.text))
     if may_be_untested:
         outcomes = [replace(o, fails=o.fails and o.holds is not None) for o in outcomes]
     if body is not Trial.run and not others and asserts(body):

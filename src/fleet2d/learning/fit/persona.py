@@ -149,7 +149,8 @@ def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
             f"{left_out} of {len(timeline.minutes)} days are left out: the night before or after"
             " them isn't in the log, or they begin before midnight"
         )
-    unknown = float(np.mean(timeline.seconds[[day.number for day in days]] < 0)) if days else 0.0
+    numbers = [day.number for day in days]
+    unknown = float(np.mean(timeline.seconds[numbers] < 0)) if days else 0.0
     if unknown > MUCH_UNKNOWN:
         notes.append(f"{unknown:.0%} of the time is unknown: what was done before it goes on")
     (only, *others) = timeline.places
@@ -228,8 +229,9 @@ class _Fitter:
     def rest(self, days: Sequence[LivedDay]) -> None:
         """Describe rest, for times in which nothing else fits, by the most frequent state."""
         lasts = _time_by_state(run for day in days for run in day.awake)
-        home = {s: n for s, n in lasts.items() if self.timeline.states[s].place != AWAY}
-        state = max(home or lasts, key=lambda s: (lasts[s], -s))
+        states = self.timeline.states
+        at_home = [state for state in lasts if states[state].place != AWAY]
+        state = max(at_home or lasts, key=lambda state: (lasts[state], -state))
         self._add("rest", state, takes="15 min")
 
     def _add(self, name: str, state: int, **fields: Any) -> None:

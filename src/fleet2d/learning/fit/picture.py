@@ -150,7 +150,8 @@ def _draw_shares(axes: Axes, values: F64, detected: Bool, shares: F64) -> None:
             hit = wilson(int(detected[inside].sum()), int(inside.sum()))
             below = hit.value - (hit.low or 0.0)
             above = (hit.high or 1.0) - hit.value
-            rows.append((values[inside].mean(), hit.value, below, above, shares[inside].mean()))
+            fitted = shares[inside].mean()
+            rows.append((values[inside].mean(), hit.value, below, above, fitted))
     x, y, *reach, fit = np.array(rows).T
     axes.plot(x, fit, color=FIT_COLOR, lw=2, label="fitted")
     style: dict[str, Any] = {"fmt": "o", "ms": 4, "color": OBSERVED_COLOR, "lw": 1}

@@ -81,7 +81,8 @@ class Timeline:
     def places_of(self, states: I16) -> I16:
         """Return the indices of the places of some states, -1 where unknown."""
         places = self.places
-        index = np.array([places.index(s.place) for s in self.states] + [-1], np.int16)
+        numbers = [places.index(state.place) for state in self.states]
+        index = np.array([*numbers, UNKNOWN_STATE], np.int16)
         return index[states]
 
 
@@ -113,7 +114,9 @@ def read_timeline(
             f"{log.path} has no readings for most of its {log.days} days: there is nothing to fit"
         )
     first = log.first_day
-    weekdays = tuple((first.weekday() + i) % 7 for i in range(log.days)) if first else None
+    weekdays = None
+    if first:
+        weekdays = tuple((first.weekday() + i) % 7 for i in range(log.days))
     return Timeline(states, minutes, seconds, weekdays)
 
 
@@ -142,7 +145,8 @@ def read_seconds(
             continue
         visit_end = visits[number + 1].first if number + 1 < len(visits) else visit.last + 1
         place = "entryway" if visit.place == DOOR else visit.place
-        parts = [(max(step, 0), label) for step, label in visit.activities] or [(visit.first, "")]
+        parts = [(max(step, 0), label) for step, label in visit.activities]
+        parts = parts or [(visit.first, "")]
         for (step, label), (end, _) in pairwise([*parts, (visit_end, "")]):
             name = room_type(label) if label else ""
             state = ActivityPlace("away" if place == AWAY and not name else name, place)
@@ -187,7 +191,7 @@ def by_minute(seconds: I16, states: int) -> I16:
     """
     of_minute = seconds.reshape(-1, 60)
     best = of_minute[:, 0].copy()
-    changes = np.flatnonzero((of_minute[:, 1:] != of_minute[:, :-1]).any(axis=1))
+    changes = np.flatnonzero((of_minute != of_minute[:, :1]).any(axis=1))
     varied = of_minute[changes]
     found = np.full(len(varied), UNKNOWN_STATE, np.int16)
     most = (varied == UNKNOWN_STATE).sum(axis=1)

@@ -52,7 +52,9 @@ def sample_persona(
     """
     life = Life(fitted.persona, seed, "fit")
     places = timeline.places
-    place_of = {n: places.index(timeline.states[s].place) for n, s in fitted.states.items()}
+    place_of = {}
+    for activity, state in fitted.states.items():
+        place_of[activity] = places.index(timeline.states[state].place)
     states = np.zeros((days + 2) * DAY_S, np.int16)
     rooms = np.zeros((days + 2) * DAY_S, np.int16)
     for day in range(days + 1):  # the first night is of the day before the first
@@ -83,8 +85,10 @@ def sample_markov(labels: I16, count: int, days: int, seed: int = 0) -> I16:
     drawn by the frequency of the labels.
     """
     follows = np.zeros((count, count), np.int64)
-    known = (labels[:, :-1] >= 0) & (labels[:, 1:] >= 0)
-    np.add.at(follows, (labels[:, :-1][known], labels[:, 1:][known]), 1)
+    before = labels[:, :-1]
+    after = labels[:, 1:]
+    known = (before >= 0) & (after >= 0)
+    np.add.at(follows, (before[known], after[known]), 1)
     share = np.bincount(labels[labels >= 0], minlength=count)
     for label in range(count):
         if not follows[label].any():
@@ -177,7 +181,8 @@ def validate(
         rest = [day for day in days if day not in held]
         fitted = fit_persona(timeline, rest, private=private)
         by_fold.append(_fold(timeline, fitted, rest, held, seed))
-    return Validation(len(days), folds, *(_mean(found) for found in zip(*by_fold, strict=True)))
+    means = map(_mean, zip(*by_fold, strict=True))
+    return Validation(len(days), folds, *means)
 
 
 def _fold(
@@ -214,4 +219,5 @@ def _fold(
 
 def _mean(folds: Sequence[tuple[RoutineDistances, ...]]) -> tuple[RoutineDistances, ...]:
     """Return the mean distances of each model over the folds."""
-    return tuple(RoutineDistances(*row) for row in np.mean(np.array(folds), axis=0).tolist())
+    means = np.mean(np.array(folds), axis=0)
+    return tuple(map(RoutineDistances._make, means.tolist()))

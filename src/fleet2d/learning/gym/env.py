@@ -193,7 +193,8 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         for name in options:
             check_known(name, "option", OPTIONS, InputError)
         super().reset(seed=seed)
-        values = self.variants.task.draw(self.np_random, self.split) | options.get("values", {})
+        drawn_values = self.variants.task.draw(self.np_random, self.split)
+        values = drawn_values | options.get("values", {})
         drawn = int(self.np_random.integers(2**53))
         variant = self.variants.load(values)
         if not {*self.robots} <= {*variant.robots}:

@@ -164,7 +164,8 @@ def forecast(known: ForecastMoments, asked: ForecastMoments, learner: str, task:
         metrics["macro_f1"] = macro_f1(truth, guess)
     else:
         metrics["naive_accuracy"] = float(np.mean(asked.inputs[:, 0] == truth))
-    return Forecast(-np.log(found[rows, truth]), (guess == truth) * 1.0, asked.day, metrics)
+    loss = -np.log(found[rows, truth])
+    return Forecast(loss, (guess == truth) * 1.0, asked.day, metrics)
 
 
 def macro_f1(truth: I64, guess: I64) -> float:

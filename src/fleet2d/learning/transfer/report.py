@@ -125,7 +125,8 @@ def _has(study: Study, task: str, arm: str) -> bool:
 
     of_task = study.complete.filter(task=task)
     others = of_task.filter(pl.col("arm") != arm)
-    return bool(len(others.join(of_task.filter(arm=arm), on=["home", "learner", "days"])))
+    pairs = others.join(of_task.filter(arm=arm), on=["home", "learner", "days"])
+    return not pairs.is_empty()
 
 
 def _compared_cells(row: dict[str, Any], task: str) -> list[str]:

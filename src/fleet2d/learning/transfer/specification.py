@@ -228,7 +228,7 @@ def _read_home(settings: RealHome) -> HomeEntry:
     """
     log = settings.read()
     trace = trace_of_log(log, settings.rooms, settings.activities)
-    if not (trace.rooms >= 0).any() or set(trace.rooms.tolist()) <= {-1, OUT, OTHER}:
+    if set(trace.rooms.tolist()) <= {-1, OUT, OTHER}:
         labels = ", ".join(sorted(log.rooms)[:5])
         raise LogError(
             f"its labels ({labels}) name no kind of room: say which they are, as in rooms:"

@@ -110,11 +110,12 @@ def trace_of_log(
         LogError: The log has no such label.
     """
     states, seconds = read_seconds(log, rooms)
-    codes = np.array([*(code_of(state.place) for state in states), UNKNOWN], np.int16)
-    known = codes[seconds]
-    minutes = by_minute(_held(known, ENTRY), len(KINDS)).ravel()
+    kinds = [code_of(state.place) for state in states]
     classes = [_class_of_state(state, activities) for state in states]
-    doing = by_minute(np.array([*classes, UNKNOWN], np.int16)[seconds], len(CLASSES)).ravel()
+    kind = np.array([*kinds, UNKNOWN], np.int16)[seconds]
+    doing = np.array([*classes, UNKNOWN], np.int16)[seconds]
+    minutes = by_minute(_held(kind, ENTRY), len(KINDS)).ravel()
+    doing = by_minute(doing, len(CLASSES)).ravel()
     weekday = log.first_day.weekday() if log.first_day else 0
     return MinuteTrace.of(minutes, _fired(log, rooms, len(minutes)), doing, weekday)
 
@@ -181,7 +182,8 @@ def markov(trace: MinuteTrace, days: Any, count: int, seed: int) -> MinuteTrace:
     limits = (follows / follows.sum(axis=1, keepdims=True)).cumsum(axis=1)
     at = int(numbers[0])
     path = np.empty(count * DAY_MINUTES, np.int64)
-    for k, draw in enumerate(np.random.default_rng(seed).random(len(path)).tolist()):
+    draws = np.random.default_rng(seed).random(len(path))
+    for k, draw in enumerate(draws.tolist()):
         path[k] = at
         at = min(int(limits[at].searchsorted(draw, "right")), len(limits) - 1)
     rooms, sensors, activities = states[:, path].astype(np.int16)

@@ -244,7 +244,8 @@ def export(
 def formats() -> dict[str, str]:
     """Return what each format is, by its name; empty for formats of installed packages."""
     own = {name: text for name, (_, text) in _FORMATS.items()}
-    return dict(sorted({**dict.fromkeys(_plugins().names, ""), **own}.items()))
+    known = dict.fromkeys(_plugins().names, "") | own
+    return dict(sorted(known.items()))
 
 
 def format_of(path: Path) -> str:
