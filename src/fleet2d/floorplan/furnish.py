@@ -238,16 +238,15 @@ def _lounge(draws: Draws) -> list[FurnitureGroup]:
     ahead = depth + LEG_ROOM
     table = Piece("coffee_table", (width - table_w) / 2, ahead, table_w, table_d)
     beside = Piece("armchair", width + 0.1, ahead - 0.1, seat, seat, turn=1)
-    large = [
-        FurnitureGroup(*size, pieces, front=0.5, corner=15)
-        for size, pieces in (
-            ((width + 0.1 + seat, ahead + max(table_d, seat)), (sofa, table, beside)),
-            ((width, ahead + table_d), (sofa, table)),
-            ((width, depth), (sofa,)),
-        )
+    large = partial(FurnitureGroup, front=0.5, corner=15)
+    smallest = (FURNITURE["sofa"].width[0], FURNITURE["sofa"].depth[0])
+    small = Piece("sofa", 0, 0, *smallest)
+    return [
+        large(width + 0.1 + seat, ahead + max(table_d, seat), (sofa, table, beside)),
+        large(width, ahead + table_d, (sofa, table)),
+        large(width, depth, (sofa,)),
+        FurnitureGroup(*smallest, (small,), front=0.4),
     ]
-    small = Piece("sofa", 0, 0, FURNITURE["sofa"].width[0], FURNITURE["sofa"].depth[0])
-    return [*large, FurnitureGroup(small.width, small.depth, (small,), front=0.4)]
 
 
 def _cinema(draws: Draws) -> list[FurnitureGroup]:
@@ -302,10 +301,13 @@ def _kitchen(draws: Draws) -> list[FurnitureGroup]:
     groups = [_row(row, draws) for row in rows]
     if not draws.below(2):
         return groups
-    return [  # from right to left
-        replace(g, pieces=tuple(replace(p, left=g.width - p.left - p.width) for p in g.pieces))
-        for g in groups
-    ]
+    return [_mirrored(group) for group in groups]
+
+
+def _mirrored(group: FurnitureGroup) -> FurnitureGroup:
+    """Return a group whose pieces stand from right to left."""
+    pieces = [replace(p, left=group.width - p.left - p.width) for p in group.pieces]
+    return replace(group, pieces=tuple(pieces))
 
 
 _DINE = partial(_dining, seats=4)

@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
@@ -409,7 +409,9 @@ class Interior:
         if not grown:
             return True
         # Cells that stay connected near by stay so; otherwise a route may lead farther around.
-        near = tuple(_hull([w[k] for w in grown], view.window[k].start) for k in (0, 1))
+        rows, columns = zip(*grown, strict=True)
+        top, left = view.window
+        near = (_hull(rows, top.start), _hull(columns, left.start))
         return not _split(before[near], after[near], 0) or not _split(before, after, view.pocket)
 
     def _usable(self, view: RoomView, things: list[PlacedObject]) -> list[PlacedObject] | None:
@@ -466,7 +468,7 @@ class Interior:
                 self._approached[row, column] = bool(self.standing[row, column])
 
 
-def _hull(slices: list[slice], start: int) -> slice:
+def _hull(slices: Sequence[slice], start: int) -> slice:
     """Return the slice, relative to a start, that holds others and one more cell on either side."""
     first, last = min(s.start for s in slices) - 1, max(s.stop for s in slices) + 1
     return slice(max(first - start, 0), last - start)

@@ -166,7 +166,7 @@ def _drop_flat_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
         bends = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
         return ring[bends | np.isin(_keys(ring), touching)]
 
-    return [[straighten(ring) for ring in rings] for rings in polygons]
+    return [list(map(straighten, rings)) for rings in polygons]
 
 
 def _split_at(polygons: list[list[I64]], vertices: I64) -> list[list[I64]]:
@@ -186,7 +186,7 @@ def _split_at(polygons: list[list[I64]], vertices: I64) -> list[list[I64]]:
         order = inserted[np.lexsort((distances[inserted], wall[inserted]))]
         return np.insert(ring, wall[order] + 1, vertices[near[order]], axis=0)
 
-    return [[split(ring) for ring in rings] for rings in polygons]
+    return [list(map(split, rings)) for rings in polygons]
 
 
 def _build(polygons: list[list[I64]]) -> Mesh | None:
@@ -222,9 +222,7 @@ def _triangulate(polygons: list[list[I64]]) -> I64:
     There are none where GEOS fails.
     """
     for sides in _MIRRORS:
-        shapes = [
-            Polygon(rings[0] * sides, [hole * sides for hole in rings[1:]]) for rings in polygons
-        ]
+        shapes = [_mirrored(rings, sides) for rings in polygons]
         with suppress(shapely.GEOSException):
             filled = shapely.get_parts(shapely.constrained_delaunay_triangles(shapes))
             break
@@ -235,6 +233,11 @@ def _triangulate(polygons: list[list[I64]]) -> I64:
     areas = _doubled_areas(corners)
     corners[areas < 0] = corners[areas < 0][:, ::-1]
     return corners[areas != 0]
+
+
+def _mirrored(rings: list[I64], sides: tuple[int, int]) -> Polygon:
+    outline, *holes = (ring * sides for ring in rings)
+    return Polygon(outline, holes)
 
 
 def _cross_products(starts: I64, ends: I64) -> I64:
@@ -309,17 +312,20 @@ class Gates:
         """
         vertices = mesh.vertices
         corners = [tuple(triangle) for triangle in mesh.triangles.tolist()]
-        owner = {(t[k], t[(k + 1) % 3]): i for i, t in enumerate(corners) for k in range(3)}
+        owner = {edge: number for number, t in enumerate(corners) for edge in _edges(t)}
         ends = [(_vertex(vertices, a), _vertex(vertices, b)) for a, b in segments]
         for a, b in ends:
             _force_edge(vertices, corners, owner, a, b)
-        across = [[owner.get((t[(k + 1) % 3], t[k]), WALL) for k in range(3)] for t in corners]
-        self.mesh = Mesh(vertices, np.array(corners, np.int32), np.array(across, np.int32))
+        across = [owner.get((b, a), WALL) for t in corners for a, b in _edges(t)]
+        neighbors = np.array(across, np.int32).reshape(-1, 3)
+        self.mesh = Mesh(vertices, np.array(corners, np.int32), neighbors)
+
+        def side(a: int, b: int) -> tuple[int, int]:
+            triangle = owner[a, b]
+            return triangle, corners[triangle].index(a)
+
         # Both sides of each: (triangle, edge).
-        self._sides = [
-            tuple((owner[edge], corners[owner[edge]].index(edge[0])) for edge in ((a, b), (b, a)))
-            for a, b in ends
-        ]
+        self._sides = [(side(a, b), side(b, a)) for a, b in ends]
 
     def shut(self, gates: Collection[int]) -> Mesh:
         """Return the mesh with these gates shut, by their number."""
@@ -330,6 +336,11 @@ class Gates:
             for triangle, edge in self._sides[gate]:
                 neighbors[triangle, edge] = WALL
         return self.mesh.with_neighbors(neighbors)
+
+
+def _edges(corners: tuple[int, ...]) -> tuple[tuple[int, int], ...]:
+    a, b, c = corners
+    return (a, b), (b, c), (c, a)
 
 
 def _force_edge(
@@ -344,15 +355,15 @@ def _force_edge(
             break
         p, q = crossing.pop(0)
         left, right = owner[p, q], owner[q, p]
-        c, d = (next(v for v in corners[t] if v not in (p, q)) for t in (left, right))
+        (c,) = {*corners[left]} - {p, q}
+        (d,) = {*corners[right]} - {p, q}
         if _turn(vertices, d, c, q) * _turn(vertices, d, c, p) >= 0:
             crossing.append((p, q))  # the quadrilateral is not convex yet
             continue
         corners[left], corners[right] = (p, d, c), (d, q, c)
         del owner[p, q], owner[q, p]
         for t in (left, right):
-            x, y, z = corners[t]
-            owner[x, y] = owner[y, z] = owner[z, x] = t
+            owner |= dict.fromkeys(_edges(corners[t]), t)
         if {c, d} != {a, b} and _cross(vertices, a, b, c, d):
             crossing.append((c, d))
     if (a, b) not in owner or (b, a) not in owner:

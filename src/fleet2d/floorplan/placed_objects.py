@@ -63,10 +63,11 @@ def number_names(names: Sequence[str | None], types: Sequence[str], noun: str) -
     if twice:
         raise FloorPlanError(f"two {noun}s are named {twice[0]!r}: give each {noun} its own name")
     numbers: defaultdict[str, count[int]] = defaultdict(lambda: count(1))
-    return [
-        name or next(new for k in numbers[kind] if (new := f"{kind}_{k}") not in own)
-        for name, kind in zip(names, types, strict=True)
-    ]
+
+    def numbered(kind: str) -> str:
+        return next(new for k in numbers[kind] if (new := f"{kind}_{k}") not in own)
+
+    return [name or numbered(kind) for name, kind in zip(names, types, strict=True)]
 
 
 def distinct_names(names: Sequence[str | None], plural: str, notes: list[str]) -> list[str | None]:

@@ -513,12 +513,13 @@ class FloorPlan:
     def digest(self) -> str:
         """SHA-256 of the content, which is all but source and notes; the same on any machine."""
         lattice = self.lattice
+        ring_sizes = [shapely.get_num_coordinates(shapely.get_rings(p)) for p in self.polygons]
         head: dict[str, Any] = {
             "name": self.name,
             "lattice": [lattice.cell, *lattice.origin, lattice.columns, lattice.rows],
             "rooms": [[room.name, room.type, *room.labels] for room in self.rooms],
             "entrance": self.entrance,
-            "rings": [[len(ring.coords) for ring in shapely.get_rings(p)] for p in self.polygons],
+            "rings": [sizes.tolist() for sizes in ring_sizes],
         }
         # Parts that a plan doesn't have are left out, so that older digests stay valid.
         further = {

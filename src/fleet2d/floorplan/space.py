@@ -308,19 +308,21 @@ class Space:
         vertices = self.mesh.vertices
         outlines = shapely.get_rings(self.polygons)
         rings = [shapely.get_coordinates(ring)[:-1].astype(np.int64) for ring in outlines]
-        p, q, r = (np.concatenate([np.roll(v, k, axis=0) for v in rings]) for k in (1, 0, -1))
-        into = q - p
-        out = r - q
+        corners = np.concatenate(rings)
+        before = np.concatenate([np.roll(ring, 1, axis=0) for ring in rings])
+        after = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
+        into = corners - before
+        out = after - corners
         # The free space lies to the left.
         reflex = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
         keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
-        ids = np.searchsorted(keys, q[:, 0] << 32 | q[:, 1])
+        ids = np.searchsorted(keys, corners[:, 0] << 32 | corners[:, 1])
         walls_meeting = np.bincount(ids, minlength=len(vertices))
         vertex, first = np.unique(ids[reflex], return_index=True)
         return Corners(
             vertex=vertex.astype(np.int64),
-            before=p[reflex][first],
-            after=r[reflex][first],
+            before=before[reflex][first],
+            after=after[reflex][first],
             simple=walls_meeting[vertex] == 1,
         )
 

@@ -9,7 +9,7 @@ from fleet2d.algorithms.algorithm import Present
 from fleet2d.algorithms.history import History
 from fleet2d.algorithms.presence.belief import HOURS, presence_of
 from fleet2d.kernels import F64, I64
-from fleet2d.metrics.ltp_error import LongTermMetric, steps_by_hour
+from fleet2d.metrics.ltp_error import LongTermMetric, as_columns, steps_by_hour
 
 MONDAY = datetime(2026, 1, 5)
 USUALLY = 0.5  # share of the time from which on somebody is usually there
@@ -31,7 +31,8 @@ def answer_scores(truth: F64, belief: F64) -> dict[str, float]:
         >>> {name: round(score, 2) for name, score in scores.items()}
         {'home': 0.67, 'always_home': 0.67, 'away_f1': 0.67, 'place': 0.67, 'probability': 0.2}
     """
-    is_away, told_away = truth[:, -1] > USUALLY, belief[:, -1] > USUALLY
+    is_away = truth[:, -1] > USUALLY
+    told_away = belief[:, -1] > USUALLY
     answered = truth[np.arange(len(truth)), belief.argmax(axis=1)]
     either = is_away.sum() + told_away.sum()
     return {
@@ -82,16 +83,13 @@ class Habits(LongTermMetric):
         presence = presence_of(self.of, state)
         if presence is None or not state.users:
             return None
-        home, away = zip(
-            *(presence.at(MONDAY + timedelta(hours=hour)).arrays for hour in range(HOURS)),
-            strict=True,
-        )
+        hours = [MONDAY + timedelta(hours=hour) for hour in range(HOURS)]
+        home, away = zip(*(presence.at(hour).arrays for hour in hours), strict=True)
         away_share = np.array(away)[..., np.newaxis]
         belief = np.concatenate([np.array(home) * (1 - away_share), away_share], axis=2)
         for row, user in enumerate(state.users):
             self.last[user] = self._ask(counts[:, row], belief[:, row])
-        measures = list(self.last[state.users[0]])
-        columns = {name: np.array([self.last[u][name] for u in state.users]) for name in measures}
+        columns = as_columns([self.last[user] for user in state.users])
         return {"user": np.array(state.users, dtype=object), **columns}
 
     def _ask(self, steps: I64, belief: F64) -> dict[str, float]:

@@ -284,6 +284,12 @@ class LongTermMetric(Metric):
         return {user: row for user, row in rows.items() if len(rows) != 2 or user != ANYONE}
 
 
+def as_columns(rows: Sequence[Mapping[str, float]]) -> dict[str, F64]:
+    """Return rows of the same measures, at least one, as a column for each measure."""
+    columns = zip(*(row.values() for row in rows), strict=True)
+    return {name: np.array(column) for name, column in zip(rows[0], columns, strict=True)}
+
+
 class LtpError(LongTermMetric):
     """Distance of long-term presence from the true occupancy, over time.
 
@@ -355,8 +361,9 @@ class LtpError(LongTermMetric):
     ) -> dict[str, F64]:
         """Return each measure of the error, by its name: float64 (users,)."""
         if self.given == "hour_of_week":
-            each = [self._by_hour(presence, u, counts[:, row]) for row, u in enumerate(users)]
-            return {name: np.array([one[name] for one in each]) for name in each[0]}
+            return as_columns(
+                [self._by_hour(presence, u, counts[:, row]) for row, u in enumerate(users)]
+            )
         home, away = shares(counts, steps)
         if self.given == "away":
             truth = np.concatenate([home * (1 - away)[:, None], away[:, None]], axis=1)

@@ -184,34 +184,26 @@ def interruption_rules(
     def of(names: Sequence[str]) -> list[int] | None:
         return sorted({numbers[name] for name in names}) or None
 
-    need_rows = [
-        (
-            [
-                step(need.activity or name, 1.0, need.takes),
-                *(step(then, chance) for then, chance in need.then.items()),
-            ],
-            _quantiles(need.every),
-            None if need.asleep is None else _quantiles(need.asleep),
-            (
-                _chance(need.on_waking),
-                _chance(need.before_bed),
-                _chance(need.before_leaving),
-                _chance(need.on_return),
-            ),
-            seconds(need.patience),
-            None if need.between is None else _hours(need.between),
-            of(need.met_by) or [],
+    need_rows = []
+    for name, need in needs.items():
+        steps = [step(need.activity or name, 1.0, need.takes)]
+        steps += [step(then, chance) for then, chance in need.then.items()]
+        every = _quantiles(need.every)
+        asleep = None if need.asleep is None else _quantiles(need.asleep)
+        chances = (
+            _chance(need.on_waking),
+            _chance(need.before_bed),
+            _chance(need.before_leaving),
+            _chance(need.on_return),
         )
-        for name, need in needs.items()
-    ]
-    errand_rows = [
-        (
-            step(errand.activity or name, errand.probability, errand.takes),
-            of(errand.after),
-            of(errand.before),
-        )
-        for name, errand in errands.items()
-    ]
+        patience = seconds(need.patience)
+        hours = None if need.between is None else _hours(need.between)
+        met_by = of(need.met_by) or []
+        need_rows.append((steps, every, asleep, chances, patience, hours, met_by))
+    errand_rows = []
+    for name, errand in errands.items():
+        own = step(errand.activity or name, errand.probability, errand.takes)
+        errand_rows.append((own, of(errand.after), of(errand.before)))
     away = [numbers[name] for name, activity in activities.items() if activity.away]
     exclusive = frozenset(name for name, activity in activities.items() if activity.exclusive)
     firm = [numbers[n] for n, a in activities.items() if a.exclusive or not a.interruptible]
@@ -262,14 +254,14 @@ def interrupt(
     if private is not None:
         use = private.use
         rooms = [private.of(name) if name in rules.exclusive else () for name in rules.names]
-    return [
-        planner.new_episode((rules.names[activity], begin, end, "", room, role))
-        if planned < 0
-        else _part(day[planned], begin, end, role)
-        for planned, activity, begin, end, role, room in rules.core.interrupt(
-            draws, rows, use, rooms
-        )
-    ]
+    episodes = []
+    for planned, number, begin, end, role, room in rules.core.interrupt(draws, rows, use, rooms):
+        if planned < 0:
+            episode = planner.new_episode((rules.names[number], begin, end, "", room, role))
+        else:
+            episode = _part(day[planned], begin, end, role)
+        episodes.append(episode)
+    return episodes
 
 
 def _part(episode: Episode, begin: int, end: int, role: int) -> Episode:

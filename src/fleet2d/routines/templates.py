@@ -32,7 +32,9 @@ def clock(time_s: int) -> str:
     """
     days, rest = divmod(time_s, DAY_S)
     text = f"{rest // 3600:02}:{rest // 60 % 60:02}"
-    return f"{text} on the next day" if days == 1 else f"{text} {days} days on" if days else text
+    if not days:
+        return text
+    return f"{text} on the next day" if days == 1 else f"{text} {days} days on"
 
 
 def span(time_s: int) -> str:

@@ -227,10 +227,8 @@ class People:
         """Let people be in some places only: float64 (rooms + 1,), as `possible`."""
         self.layout = self.layout._replace(possible=possible)
         self.model = model_of(self.total, self.layout, self.prior)
-        self.now, self.day_start = (
-            np.stack([self._within(places) for places in all_places])
-            for all_places in (self.now, self.day_start)
-        )
+        self.now = np.stack([*map(self._within, self.now)])
+        self.day_start = np.stack([*map(self._within, self.day_start)])
 
     def _within(self, places: F64) -> F64:
         """Return one person's distribution without the places where the person can't be."""
@@ -290,19 +288,19 @@ class People:
 
     def remember(self) -> dict[str, Any]:
         """Return the learned moments of each person, as arrays, by number."""
-        return {
-            str(person): {name: part[person] for name, part in self.total._asdict().items()}
-            for person in range(self.count)
-        }
+        return {str(person): self._learned(person) for person in range(self.count)}
+
+    def _learned(self, person: int) -> dict[str, F64]:
+        return {name: part[person] for name, part in self.total._asdict().items()}
 
     def recall(self, learned: Mapping[str, Any]) -> bool:
         """Restore what `remember` returned; return whether it has the same people and states."""
         for person in range(self.count):
             own = learned.get(str(person), {})
-            for name, part in self.total._asdict().items():
+            for name, part in self._learned(person).items():
                 values = np.asarray(own.get(name, ()))
-                if values.shape != part[person].shape:
+                if values.shape != part.shape:
                     return False
-                part[person] = values
+                part[:] = values
         self.model = model_of(self.total, self.layout, self.prior)
         return True

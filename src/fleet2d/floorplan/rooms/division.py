@@ -240,19 +240,15 @@ def _window(frames: I64) -> tuple[slice, slice]:
 
 def _cells_in(box: Patch, window: tuple[slice, slice], inside: Bool) -> Bool:
     """Return the cells of a box inside a block, bool (rows, columns) of the block's window."""
-    common = [
-        (max(a.start, b.start), max(min(a.stop, b.stop), a.start, b.start))
-        for a, b in zip(box.window, window, strict=True)
-    ]
-    target, source = (
-        tuple(
-            slice(low - extent.start, high - extent.start)
-            for (low, high), extent in zip(common, bounds, strict=True)
-        )
-        for bounds in (window, box.window)
-    )
+    targets = []
+    sources = []
+    for own, other in zip(box.window, window, strict=True):
+        low = max(own.start, other.start)
+        high = max(min(own.stop, other.stop), low)
+        targets.append(slice(low - other.start, high - other.start))
+        sources.append(slice(low - own.start, high - own.start))
     cells = np.zeros(inside.shape, np.bool_)
-    cells[target] = box.mask[source]
+    cells[tuple(targets)] = box.mask[tuple(sources)]
     return cells & inside
 
 

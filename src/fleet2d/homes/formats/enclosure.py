@@ -168,13 +168,12 @@ def unnamed_space(walls: BaseGeometry, rooms: Sequence[MultiPolygon]) -> list[Po
     solid = shapely.union_all([walls, *rooms])
     holes = [Polygon(ring) for part in parts_of(solid) for ring in part.interiors]
     spaces = parts_of(opened(shapely.union_all(holes).difference(solid), 2 * TOUCH_M))
-    large = [space for space in spaces if space.area >= LEAST_M2]
-    return [
-        space
-        for space in large
-        if not opened(space, NARROW_M).is_empty
-        or sum(room.distance(space) <= TOUCH_M for room in rooms) == 1
-    ]
+
+    def is_gap(space: Polygon) -> bool:
+        is_narrow = opened(space, NARROW_M).is_empty
+        return is_narrow and sum(room.distance(space) <= TOUCH_M for room in rooms) != 1
+
+    return [space for space in spaces if space.area >= LEAST_M2 and not is_gap(space)]
 
 
 def wall_gaps(walls: BaseGeometry, rooms: Sequence[MultiPolygon]) -> Iterator[LineString]:

@@ -171,9 +171,8 @@ def _sides(area: MultiPolygon) -> NDArray[np.object_]:
     """Return the sides of an area, each a line."""
     rings = shapely.get_parts(shapely.boundary(area)).tolist()
     outlines = [shapely.get_coordinates(ring) for ring in rings]
-    starts, ends = (
-        np.concatenate([ring[s] for ring in outlines]) for s in (slice(-1), slice(1, None))
-    )
+    starts = np.concatenate([outline[:-1] for outline in outlines])
+    ends = np.concatenate([outline[1:] for outline in outlines])
     return np.asarray(shapely.linestrings(np.stack([starts, ends], axis=1)))
 
 

@@ -201,6 +201,11 @@ class _Scan(BaseModel):
     floors: Listed[_Surface] = []
     sections: Listed[_Section] = []
 
+    @property
+    def stories(self) -> list[int]:
+        """The numbers of its storeys, from the lowest."""
+        return sorted({surface.story for surface in (*self.walls, *self.floors)})
+
 
 _SCAN = TypeAdapter(_Scan)
 
@@ -234,10 +239,7 @@ class RoomPlan(FileSource):
             notes: list[str] = []
             scan = validate(_SCAN, content)
             drawn = _features(scan, notes)
-            storeys = [
-                Storey(str(story), str(story), _floor_m(scan, story))
-                for story in sorted({wall.story for wall in (*scan.walls, *scan.floors)})
-            ]
+            storeys = [Storey(str(s), str(s), _floor_m(scan, s)) for s in scan.stories]
             metre = 1 / (self.scale or 1)
             features = arrange(drawn, storeys, self.level, notes, metre=metre)
             draft = Draft(features, self.wall_m, notes, scale=self.scale)
@@ -252,9 +254,8 @@ def _floor_m(scan: _Scan, story: int) -> float:
 
 def _features(scan: _Scan, notes: list[str]) -> list[Feature]:
     """Return what a scan has as features [m]."""
-    spans = [end - start for start, end in (wall.line for wall in scan.walls)]
-    spans = spans or [np.array([1.0, 0.0])]
-    longest = max(spans, key=lambda span: float(span @ span))
+    spans = [np.diff(wall.line, axis=0)[0] for wall in scan.walls]
+    longest = max(spans, key=lambda span: float(span @ span), default=np.array([1.0, 0.0]))
     x, y = longest / max(float(np.sqrt(longest @ longest)), 1e-9)
     turn = np.array([[x, -y], [y, x]])
 
@@ -282,7 +283,7 @@ def _features(scan: _Scan, notes: list[str]) -> list[Feature]:
 
 def _rooms(scan: _Scan, place: Any, notes: list[str]) -> Iterator[Feature]:
     """Yield the rooms of a scan [m]."""
-    for story in sorted({surface.story for surface in (*scan.walls, *scan.floors)}):
+    for story in scan.stories:
         lines = [LineString(place(w.path)) for w in scan.walls if w.story == story]
         floors = [shapely.transform(f.floor, place) for f in scan.floors if f.story == story]
         spaces = _spaces([line for line in lines if line.length > 0], floors, notes)

@@ -20,7 +20,7 @@ BEFORE_M = 0.3
 # A tread is so high [m], and people take it in such a time [s].
 RISE_M = 0.17
 TREAD_S = 0.7
-SPACES = ("room", "free")
+SPACES = frozenset({"room", "free"})
 LINKS = ("stairs", "lift")
 
 
@@ -72,17 +72,17 @@ def arrange(
         if others:
             notes.append(f"of its levels, {chosen.name} is used, not {others}")
         return _alone(features, {None, chosen.key})
-    of_storey = {storey.key: [f for f in features if f.level == storey.key] for storey in in_order}
+    of_storey = {storey.key: _on(storey.key, features) for storey in in_order}
     used = _used(in_order, of_storey)
     if len(used) < 2:
         return _alone(features, {None, *(s.key for s in used)} if used else None)
     ground = min(used, key=lambda s: (s.elevation < 0, abs(s.elevation)))
-    of_storey[ground.key] += [f for f in features if f.level is None]
-    if any(f.kind in SPACES for s in used for f in of_storey[s.key]):
-        for storey in used:
+    of_storey[ground.key] += _on(None, features)
+    without_rooms = [s for s in used if not _kinds(of_storey[s.key]) & SPACES]
+    if len(without_rooms) < len(used):
+        for storey in without_rooms:
             own = of_storey[storey.key]
-            if not any(f.kind in SPACES for f in own):
-                of_storey[storey.key] = [*own, *_enclosed_rooms(own, storey.key)]
+            of_storey[storey.key] = [*own, *_enclosed_rooms(own, storey.key)]
     notes.append(f"its storeys lie side by side: {', '.join(s.name for s in used)}")
     left_out = ", ".join(s.name for s in in_order if s not in used)
     if left_out:
@@ -90,13 +90,20 @@ def arrange(
     return _side_by_side(used, of_storey, ground, notes, metre)
 
 
+def _on(key: str | None, features: Sequence[Feature]) -> list[Feature]:
+    return [feature for feature in features if feature.level == key]
+
+
+def _kinds(features: Sequence[Feature]) -> set[str]:
+    return {feature.kind for feature in features}
+
+
 def _used(storeys: Sequence[Storey], of_storey: Mapping[str, Sequence[Feature]]) -> list[Storey]:
     """Return the storeys with rooms: those that the file draws, or walls with doors enclose."""
-    kinds = {s.key: {feature.kind for feature in of_storey[s.key]} for s in storeys}
-    if not any(kinds[s.key].intersection(SPACES) for s in storeys):
+    kinds = {key: _kinds(features) for key, features in of_storey.items()}
+    if not any(own & SPACES for own in kinds.values()):
         return [s for s in storeys if "wall" in kinds[s.key]]
-    lived_in = [s for s in storeys if {"wall", "door"} <= kinds[s.key]]
-    return [s for s in storeys if kinds[s.key].intersection(SPACES) or s in lived_in]
+    return [s for s in storeys if kinds[s.key] & SPACES or kinds[s.key] >= {"wall", "door"}]
 
 
 def _alone(features: Sequence[Feature], keys: set[str | None] | None) -> list[Feature]:

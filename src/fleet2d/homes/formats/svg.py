@@ -93,13 +93,9 @@ class Svg(FileSource):
                 )
             doors = [ring for kind, _, rings, _ in shapes if kind == "door" for ring in rings]
             scale = self.scale or _scale(doors, notes)
-            features = [
-                _feature(
-                    f"{kind} {number}", kind, name, [r * (scale, -scale) for r in rings], closed
-                )
-                for number, (kind, name, rings, closed) in enumerate(shapes, 1)
-            ]
-            texts = [(text, at * (scale, -scale)) for text, at in _texts(content)]
+            metres = np.array([scale, -scale])
+            features = [_feature(number, *shape, metres) for number, shape in enumerate(shapes, 1)]
+            texts = [(text, at * metres) for text, at in _texts(content)]
             sound = [_named(f, texts) for f in features if not f.shape.is_empty]
             windows = [f for f in sound if f.properties.get("is_window")]
             boxes = [f.shape.minimum_rotated_rectangle for f in windows]
@@ -239,9 +235,12 @@ def _scale(doors: list[F64], notes: list[str]) -> float:
     return scale
 
 
-def _feature(where: str, kind: str, name: str, rings: list[F64], closed: bool) -> Feature:
-    """Return a shape as a feature [m]."""
-    outlines = [np.round(ring, 4) for ring in rings]
+def _feature(
+    number: int, kind: str, name: str, rings: list[F64], closed: bool, metres: F64
+) -> Feature:
+    """Return a shape as a feature [m]; `metres` are those to a unit of x and of y."""
+    where = f"{kind} {number}"
+    outlines = [np.round(ring * metres, 4) for ring in rings]
     shape: Any = LineString(outlines[0])
     if closed or (kind == "room" and len(outlines[0]) > 2):
         areas = [
@@ -255,5 +254,6 @@ def _feature(where: str, kind: str, name: str, rings: list[F64], closed: bool) -
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", ROOMS.sub(" ", name)).split()
     own = " ".join(words)
     is_use = _is_room(own) or ROOMS.search(name) is not None
-    properties = {"type" if is_use else "name": own} if own else {}
+    key = "type" if is_use else "name"
+    properties = {key: own} if own else {}
     return Feature(kind, where, shape, properties)

@@ -325,8 +325,8 @@ def shape_cost(layout: RoomLayout, ease: float) -> float:
         raise MisfitError
     cost += LONG_COST * max(long / short - LONG_ASPECT, 0.0)
     halls = [box for box in layout.boxes if layout.briefs[box.room].kind == "hallway"]
-    areas = [sum_in_order(box.clear_area for box in boxes) for boxes in (halls, layout.boxes)]
-    corridor = areas[0] / areas[1]
+    hall_area = sum_in_order(hall.clear_area for hall in halls)
+    corridor = hall_area / sum_in_order(box.clear_area for box in layout.boxes)
     if corridor > MAX_CORRIDOR_SHARE:
         raise MisfitError
     return cost + 12 * max(corridor - COSTLY_CORRIDOR_SHARE, 0.0)

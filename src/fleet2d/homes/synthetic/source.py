@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
+import numpy as np
 import shapely
 from pydantic import Field
 
@@ -98,7 +99,8 @@ def _free_space(
     air = _metres([*spaces, *(_hole(gap) for gap in [*house.gaps, house.front_door])])
     holes = [shapely.Polygon(ring) for part in shapely.get_parts(air) for ring in part.interiors]
     # No post stands where rectangles of one room meet.
-    posts = [hole for hole in holes if any(region.shape.covers(hole) for region in regions)]
+    rooms = np.array([region.shape for region in regions])
+    posts = [hole for hole in holes if shapely.covers(rooms, hole).any()]
     shafts = shapely.union_all([_metres([shaft]) for shaft in house.shafts])
     free = shapely.difference(shapely.union_all([air, *posts]), shafts)
     assert isinstance(free, shapely.Polygon | shapely.MultiPolygon)
