@@ -173,7 +173,8 @@ class BodyPoses:
 
     def steps_together(self, other: "BodyPoses") -> int:
         """Return the number of steps at which two bodies are in the same room."""
-        (begin, _, room), (other_begin, _, other_room) = self.visits, other.visits
+        begin, _, room = self.visits
+        other_begin, _, other_room = other.visits
         return count_together(begin, room, other_begin, other_room, len(self))
 
     @cached_property
@@ -370,7 +371,8 @@ class Log:
                 f"evidence comes in bins of {self.bin_steps} steps, but the period from step"
                 f" {first} to {end} isn't made of whole ones: choose a period of whole minutes"
             )
-        begin, last = first // self.bin_steps, end // self.bin_steps
+        begin = first // self.bin_steps
+        last = end // self.bin_steps
         since, blocks = self._bins.touching(begin, last)
         bins = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)  # often no copy
         bins = bins[begin - since : last - since]

@@ -130,7 +130,8 @@ class Invariant(Limited):
 
     def violations(self, run: RunSignals) -> list[Violation]:
         """Return the stretches in which the operand doesn't hold."""
-        first, end = run.first + run.reach(self.within)[0], self.last(run) + 1
+        first = run.first + run.reach(self.within)[0]
+        end = self.last(run) + 1
         if first >= end:
             return []
         return violations_of(self.operand.robustness(run, True).until(end).since(first))

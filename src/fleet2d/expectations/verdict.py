@@ -109,7 +109,8 @@ class Verdict:
         if worst is None:
             return ""
         day = "%a %d %b %H:%M:%S"
-        begin, end = self.clock.time(worst.first), self.clock.time(worst.last)
+        begin = self.clock.time(worst.first)
+        end = self.clock.time(worst.last)
         step = timedelta(microseconds=self.clock.step_us)
         text = f", from {begin:{day}} to {end:%H:%M:%S} ({duration_in_words(end - begin + step)})"
         if end.date() != begin.date():

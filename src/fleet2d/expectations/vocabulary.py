@@ -99,7 +99,8 @@ class distance(NumberSignal):
             )
         super().check(scene)
         if isinstance(self.other, tuple):
-            (x, y), (x0, y0, x1, y1) = self.other, scene.bounds
+            x, y = self.other
+            x0, y0, x1, y1 = scene.bounds
             if not (x0 <= x <= x1 and y0 <= y <= y1):
                 raise ScenarioError(
                     f"{self}: ({x:g}, {y:g}) m is outside the home, which reaches from"
@@ -212,7 +213,8 @@ class _Motion(Measurement):
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
         """Return its row, its pose at the step before, and the steps in a second."""
-        row, before = run.row(self.body), np.zeros(0, np.int64)
+        row = run.row(self.body)
+        before = np.zeros(0, np.int64)
         # The present pose stands for the one before, which may be forgotten.
         pose = _pose(run.bodies.pose_at(row, run.first)) if run.first > 0 else before
         return row, pose, 1e6 / run.clock.step_us
@@ -289,7 +291,8 @@ class battery(NumberSignal):
     def begin_plan(self, actor: Actor, gauge: Gauge) -> None:
         """Add the course of the charge along a new plan."""
         if actor.name == self.robot and actor.charge is not None:
-            course, (courses, step_us) = actor.charge.course(actor.motion), gauge.memory
+            course = actor.charge.course(actor.motion)
+            courses, step_us = gauge.memory
             earlier = [c for c in courses if c.begins[0] < course.begins[0]]
             gauge.memory = [*earlier, course], step_us
 
@@ -544,7 +547,8 @@ class perceived(_CameraCondition):
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the number of observations at each step at which there is one."""
-        seen, (robot, user) = block.observations, gauge.memory
+        seen = block.observations
+        robot, user = gauge.memory
         columns = seen.distinct
         is_it = (columns[:, ROBOT] == robot) & (columns[:, SightingColumn.IDENTITY] == user)
         return pulses(np.unique(seen.step[is_it[seen.index]]), block.first, block.end)
@@ -656,7 +660,8 @@ class during(Condition):
         if not separator:
             raise InputError(f"during({self.hours!r}): write from when to when, like '22:00-07:00'")
         with errors_as(InputError, "during", of=PydanticCustomError):
-            first, last = parse_time_of_day(begin.strip()), parse_time_of_day(end.strip())
+            first = parse_time_of_day(begin.strip())
+            last = parse_time_of_day(end.strip())
             names = [name.strip() for name in self.days.split(",")] if self.days else "daily"
             if first == last:
                 raise InputError(

@@ -194,7 +194,9 @@ def stand_furniture(
     model = furniture_type(kind)
     width, depth = size if size is not None else (sum(model.width) / 2, sum(model.depth) / 2)
     # The unit vectors come from a table, so that places are the same on every machine.
-    (x0, y0), dx, dy = at, cosine(heading) / UNIT, sine(heading) / UNIT
+    x0, y0 = at
+    dx = cosine(heading) / UNIT
+    dy = sine(heading) / UNIT
 
     def place(ahead: float, left: float) -> Point:
         return x0 + ahead * dx - left * dy, y0 + ahead * dy + left * dx

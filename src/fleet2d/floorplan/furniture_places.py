@@ -232,7 +232,8 @@ class RoomView:
         """Return a place (x, y) [m] as column and row of the turned window."""
         height, width = self.inside.shape
         low = self.lattice.to_lattice((x, y)) / UNITS_PER_CELL
-        x, y = float(low[0]) - self.window[1].start, float(low[1]) - self.window[0].start
+        x = float(low[0]) - self.window[1].start
+        y = float(low[1]) - self.window[0].start
         return ((x, y), (y, width - x), (width - x, height - y), (height - y, x))[turn]
 
 
@@ -245,7 +246,8 @@ def count_cells(cell: float, metres: float) -> int:
 def cells_after(mask: Bool, reach: int, axis: int) -> Bool:
     """Return the cells that follow a cell of the mask within `reach`, or precede it if negative."""
     out = np.zeros_like(mask)
-    after, before = np.moveaxis(out, axis, 0), np.moveaxis(mask, axis, 0)
+    after = np.moveaxis(out, axis, 0)
+    before = np.moveaxis(mask, axis, 0)
     if reach < 0:
         after, before = after[::-1], before[::-1]
     for step in range(1, abs(reach) + 1):
@@ -470,7 +472,8 @@ class Interior:
 
 def _hull(slices: Sequence[slice], start: int) -> slice:
     """Return the slice, relative to a start, that holds others and one more cell on either side."""
-    first, last = min(s.start for s in slices) - 1, max(s.stop for s in slices) + 1
+    first = min(s.start for s in slices) - 1
+    last = max(s.stop for s in slices) + 1
     return slice(max(first - start, 0), last - start)
 
 

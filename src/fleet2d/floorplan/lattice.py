@@ -167,7 +167,8 @@ class Lattice:
             >>> Lattice.around((0.1, 0.1, 5.06, 5.06), cell=0.05).point_at((0.1, 0.05))
             (128, 64)
         """
-        units, (x0, y0) = self.units_per_m, self._origin_point
+        units = self.units_per_m
+        x0, y0 = self._origin_point
         return round(xy[0] * units) - x0, round(xy[1] * units) - y0
 
     def xy_of(self, x: int, y: int) -> tuple[float, float]:
@@ -177,7 +178,8 @@ class Lattice:
             >>> Lattice.around((0.1, 0.1, 5.06, 5.06), cell=0.05).xy_of(128, 64)
             (0.1, 0.05)
         """
-        units, (x0, y0) = self.units_per_m, self._origin_point
+        units = self.units_per_m
+        x0, y0 = self._origin_point
         return (x + x0) / units, (y + y0) / units
 
     def to_walls(self, xy: ArrayLike) -> I64:

@@ -138,7 +138,8 @@ def _rings(polygons: Sequence[Polygon], width: int, height: int) -> list[list[I6
             raise FloorPlanError(
                 "Walls must lie on even lattice units. Pass the polygon to snap_polygon first."
             )
-        low, high = exact.min(axis=0), exact.max(axis=0)
+        low = exact.min(axis=0)
+        high = exact.max(axis=0)
         if low.min() < 0 or high[0] > width or high[1] > height or high.max() >= COORDINATE_LIMIT:
             raise FloorPlanError(
                 f"The walls reach from {low.tolist()} to {high.tolist()} lattice units, but the "
@@ -162,8 +163,9 @@ def _drop_flat_vertices(polygons: list[list[I64]]) -> list[list[I64]]:
     touching = keys[counts > 1]
 
     def straighten(ring: I64) -> I64:
-        before, after = np.roll(ring, 1, axis=0) - ring, np.roll(ring, -1, axis=0) - ring
-        bends = before[:, 0] * after[:, 1] != before[:, 1] * after[:, 0]
+        before = np.roll(ring, 1, axis=0) - ring
+        after = np.roll(ring, -1, axis=0) - ring
+        bends = cross_products(before, after) != 0
         return ring[bends | np.isin(_keys(ring), touching)]
 
     return [list(map(straighten, rings)) for rings in polygons]
@@ -180,7 +182,7 @@ def _split_at(polygons: list[list[I64]], vertices: I64) -> list[list[I64]]:
         along = (ends - ring)[wall]
         offsets = vertices[near] - ring[wall]
         distances = (offsets * along).sum(axis=1)
-        on_line = along[:, 0] * offsets[:, 1] == along[:, 1] * offsets[:, 0]
+        on_line = cross_products(along, offsets) == 0
         between = on_line & (distances > 0) & (distances < (along * along).sum(axis=1))
         inserted = np.flatnonzero(between)
         order = inserted[np.lexsort((distances[inserted], wall[inserted]))]
@@ -200,8 +202,8 @@ def _build(polygons: list[list[I64]]) -> Mesh | None:
     vertices = np.stack([keys // (2 * COORDINATE_LIMIT), keys % (2 * COORDINATE_LIMIT)], axis=1)
     corners = _triangulate(polygons)
     triangles = np.searchsorted(keys, _keys(corners))
-    area = int(_doubled_areas(corners).sum())
-    area_between_walls = int(_cross_products(wall_starts, wall_ends).sum())
+    area = int(doubled_areas(corners).sum())
+    area_between_walls = int(cross_products(wall_starts, wall_ends).sum())
     if area != area_between_walls or not np.array_equal(vertices[triangles], corners):
         return None
     walls = np.searchsorted(keys, _keys(wall_starts)) * len(keys)
@@ -230,7 +232,7 @@ def _triangulate(polygons: list[list[I64]]) -> I64:
         return np.zeros((0, 3, 2), np.int64)
     exact = shapely.get_coordinates(filled).reshape(len(filled), 4, 2)[:, :3]
     corners: I64 = exact.astype(np.int64) * sides
-    areas = _doubled_areas(corners)
+    areas = doubled_areas(corners)
     corners[areas < 0] = corners[areas < 0][:, ::-1]
     return corners[areas != 0]
 
@@ -240,14 +242,14 @@ def _mirrored(rings: list[I64], sides: tuple[int, int]) -> Polygon:
     return Polygon(outline, holes)
 
 
-def _cross_products(starts: I64, ends: I64) -> I64:
+def cross_products(starts: I64, ends: I64) -> I64:
     """Return the cross products of points; over a closed ring they add up to twice its area."""
-    return starts[:, 0] * ends[:, 1] - starts[:, 1] * ends[:, 0]
+    return starts[..., 0] * ends[..., 1] - starts[..., 1] * ends[..., 0]
 
 
-def _doubled_areas(corners: I64) -> I64:
+def doubled_areas(corners: I64) -> I64:
     """Return twice the signed area of each triangle; `corners` is int64 (t, 3, 2)."""
-    return _cross_products(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return cross_products(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _neighbors(triangles: I64, vertex_count: int, walls: I64) -> I32 | None:
@@ -377,10 +379,8 @@ def _crossing(
     """Return the inner edges that cross a segment, each once."""
     edges = np.fromiter(chain.from_iterable(owner), np.int64, 2 * len(owner)).reshape(-1, 2)
     edges = edges[edges[:, 0] < edges[:, 1]]
-    start = vertices[a]
-    along = vertices[b] - start
-    side = np.sign(along[0] * (vertices[:, 1] - start[1]) - along[1] * (vertices[:, 0] - start[0]))
-    apart = edges[side[edges[:, 0]] * side[edges[:, 1]] < 0].tolist()
+    side = np.sign(cross_products(vertices[b] - vertices[a], vertices - vertices[a]))
+    apart = edges[side[edges].prod(axis=1) < 0].tolist()
     return [(p, q) for p, q in apart if (q, p) in owner and _cross(vertices, a, b, p, q)]
 
 
@@ -399,7 +399,7 @@ def _turn(vertices: I64, a: int, b: int, c: int) -> int:
 
 def _vertex(vertices: I64, point: tuple[int, int]) -> int:
     """Return the id of the vertex at a point."""
-    matches = np.flatnonzero((vertices[:, 0] == point[0]) & (vertices[:, 1] == point[1]))
+    matches = np.flatnonzero((vertices == point).all(axis=1))
     if len(matches) == 0:
         raise FloorPlanError(f"the door line ends at {point} [lattice], where no wall is")
     return int(matches[0])

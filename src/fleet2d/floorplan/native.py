@@ -286,7 +286,8 @@ class PortalEntry(FileModel):
     def to_portal(self, scale: float) -> Portal:
         """Return the portal as a part of a plan, with its places multiplied by `scale`."""
         (x0, y0), (x1, y1) = self.start, self.end
-        start, end = (x0 * scale, y0 * scale), (x1 * scale, y1 * scale)
+        start = (x0 * scale, y0 * scale)
+        end = (x1 * scale, y1 * scale)
         return Portal(self.type, start, end, round(self.takes * 1_000_000))
 
 

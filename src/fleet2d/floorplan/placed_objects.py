@@ -213,9 +213,8 @@ def move_object(
         dx, dy = (lattice.to_lattice(xy) - pivot).T
         c = cosine(turn)
         s = sine(turn)
-        half = UNIT // 2
-        turned = np.stack([(c * dx - s * dy + half) // UNIT, (s * dx + c * dy + half) // UNIT], -1)
-        return lattice.to_metres(goal + turned)
+        turned = np.stack([c * dx - s * dy, s * dx + c * dy], -1)
+        return lattice.to_metres(goal + (turned + UNIT // 2) // UNIT)
 
     uses = []
     for use in thing.uses:

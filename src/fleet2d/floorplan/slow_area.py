@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from fractions import Fraction
-from itertools import pairwise
+from itertools import compress, pairwise
 from math import ceil
+from operator import gt
 from typing import NamedTuple
 
 import numpy as np
@@ -73,7 +74,9 @@ class SlowRegion(NamedTuple):
 
     def crossings(self, start: LatticePoint, end: LatticePoint) -> set[Fraction]:
         """Return where a leg crosses its sides, as shares of the leg strictly between 0 and 1."""
-        (x, y), dx, dy = start, end[0] - start[0], end[1] - start[1]
+        x, y = start
+        dx = end[0] - start[0]
+        dy = end[1] - start[1]
         shares = set()
         for (ax, ay), (bx, by) in self.sides():
             cross = dx * (by - ay) - dy * (bx - ax)
@@ -113,14 +116,13 @@ def slowed(rows: I64, regions: Sequence[SlowRegion]) -> I64:
         for begin, end in pairwise([Fraction(0), *sorted(shares), Fraction(1)]):
             middle = (begin + end) / 2
             now = [r.holds(x0 + middle * (x1 - x0), y0 + middle * (y1 - y0)) for r in regions]
-            entered = [
-                r.stop_us for r, old, new in zip(regions, within, now, strict=True) if new > old
-            ]
+            entered = compress(regions, map(gt, now, within))
+            stop_us = max((region.stop_us for region in entered), default=0)
             within = now
-            if max(entered, default=0):
-                time_us += max(entered)
+            if stop_us:
+                time_us += stop_us
                 result.append([time_us, *result[-1][1:]])
-            speed = min((r.speed for r, new in zip(regions, now, strict=True) if new), default=1)
+            speed = min((region.speed for region in compress(regions, now)), default=1)
             time_us += ceil((t1 - t0) * (end - begin) / speed)
             turned = round(turn_between(h0, h1) * end)
             point = round(x0 + end * (x1 - x0)), round(y0 + end * (y1 - y0))

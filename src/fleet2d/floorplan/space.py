@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from fleet2d.errors import FloorPlanError
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice, LatticePoint
-from fleet2d.floorplan.mesh import Segment, build_mesh, snap_polygon
+from fleet2d.floorplan.mesh import Segment, build_mesh, cross_products, snap_polygon
 from fleet2d.floorplan.placed_objects import PORTAL_REACH_M, PlacedObject, Portal, UsePlace
 from fleet2d.floorplan.plan import FloorPlan, cells_of, read_only
 from fleet2d.kernels import (
@@ -282,11 +283,7 @@ class Space:
         self, x: int, y: int, most: int, part: int | None = None, room: int | None = None
     ) -> I64:
         """Return the free cells (row, column) nearest to a point, at most so many, in order."""
-        row, column = y // SUB, x // SUB
-        near = (
-            slice(max(0, row - NEAR_CELLS), max(0, row + NEAR_CELLS + 1)),
-            slice(max(0, column - NEAR_CELLS), max(0, column + NEAR_CELLS + 1)),
-        )
+        near = (_near(y // SUB), _near(x // SUB))
         for window in (near, (slice(0, None), slice(0, None))):
             parts = self.part_of_cell[window]
             mask = parts >= 0 if part is None else parts == part
@@ -314,7 +311,7 @@ class Space:
         into = corners - before
         out = after - corners
         # The free space lies to the left.
-        reflex = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0] < 0
+        reflex = cross_products(into, out) < 0
         keys = vertices[:, 0] << 32 | vertices[:, 1]  # sorted, as the vertices are
         ids = np.searchsorted(keys, corners[:, 0] << 32 | corners[:, 1])
         walls_meeting = np.bincount(ids, minlength=len(vertices))
@@ -398,7 +395,8 @@ class LinkedSpace(Space):
         self._passings: list[Passing] = []
         owner = np.arange(base.parts)
         for portal in portals:
-            begin, end = self._end(portal.start), self._end(portal.end)
+            begin = self._end(portal.start)
+            end = self._end(portal.end)
             if begin is None or end is None:
                 continue  # furniture bars it
             ways = ((begin, end), (end, begin))
@@ -514,14 +512,22 @@ def _with_walls_moved(polygon: Polygon, octagon: I64) -> Polygon | None:
     return shape if shape.is_valid else None
 
 
+def _near(cell: int) -> slice:
+    return slice(max(0, cell - NEAR_CELLS), max(0, cell + NEAR_CELLS + 1))
+
+
 @lru_cache(64)
 def body_octagon(radius: float) -> I64:
     """Return the corners of the octagon that approximates a body."""
     a = 2 * math.ceil((radius + ROUNDING) / 2)
     # tan(22.5 degrees), rounded up: the slanted sides are no nearer than the straight ones.
     b = 2 * math.ceil(a * 0.41421357 / 2)
-    corners = [(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)]
-    return read_only(np.array(corners))
+    return read_only(_octagon(a, b))
+
+
+def _octagon(a: int, b: int) -> I64:
+    """Return the corners of an octagon whose straight sides are at `a` and reach to `b`."""
+    return np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
 
 
 def grow_shape(corners: F64, radius: float) -> BaseGeometry:
@@ -636,7 +642,7 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     upright = _upright_rectangle(footprint)
     if upright is not None:
         return _cells_by_rectangle(lattice, lattice.to_lattice(upright), a, b)
-    octagon = np.array([(a, b), (b, a), (-b, a), (-a, b), (-a, -b), (-b, -a), (b, -a), (a, -b)])
+    octagon = _octagon(a, b)
     convex: BaseGeometry = footprint
     solid_area = footprint.convex_hull.area * (1 - CONVEX_SLACK)
     if footprint.interiors or footprint.area < solid_area:
@@ -654,7 +660,7 @@ def grown_cells(lattice: Lattice, footprint: Polygon, radius: float) -> tuple[Wi
     covered = np.zeros((y.shape[0], x.shape[1]), np.bool_)
     for corners in hulls:
         inside = np.ones_like(covered)
-        for (ax, ay), (bx, by) in zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True):
+        for (ax, ay), (bx, by) in pairwise(corners.tolist()):
             inside &= (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0
         covered |= inside
     return window, covered
@@ -691,8 +697,8 @@ def _cells_by_rectangle(lattice: Lattice, corners: I64, a: int, b: int) -> tuple
     # How far they are beyond its nearer side; less than 0 between the two.
     x = np.maximum(x0 - xs, xs - x1)
     y = np.maximum(y0 - ys, ys - y1)
-    covered = (x <= a)[None, :] & (y <= a)[:, None] & (x[None, :] + y[:, None] <= a + b)
-    return (rows, columns), covered
+    is_near = (x <= a)[None, :] & (y <= a)[:, None]
+    return (rows, columns), is_near & (x[None, :] + y[:, None] <= a + b)
 
 
 def with_approaches(

@@ -74,7 +74,8 @@ def _fixes(path: Path, name: str | None, frame: str) -> RawFixes:
         tree = FrameTree(reader, path)
         source, poses, notes = _poses(reader, tree, name, frame)
         motions, is_known = poses.seen_from(frame, tree, source, notes)
-    (x, y, _), heading = motions.place.T, headings_of(motions.turn)
+    x, y, _ = motions.place.T
+    heading = headings_of(motions.turn)
     if without := int(np.isnan(heading).sum()):
         notes.append(f"{without} poses have no heading: their quaternion is 0 or not a number")
     if steep := int(motions.is_steep().sum()):

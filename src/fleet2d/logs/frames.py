@@ -173,7 +173,8 @@ class FrameTree:
         for connection, time, data in self._reader.messages(connections) if connections else ():
             for one in self._reader.deserialize(data, connection.msgtype).transforms:
                 row = numbers_of(one.transform.translation, one.transform.rotation)
-                if np.isnan([*row[:3], *unit_turns(np.array([row[3:]]))[0]]).any():
+                turn = unit_turns(np.array([row[3:]]))
+                if np.isnan(row[:3]).any() or np.isnan(turn).any():
                     left_out += 1
                     continue
                 topic = connection.topic

@@ -106,8 +106,9 @@ def read_homer(
         if without_room := {block.activity for block in blocks} - {r.activity for r in of_day}:
             names = ", ".join(sorted(without_room))
             notes.append(f"{file.name}: in no room, or in no time: {names}")
+        midnight_us = number * DAY_US
         readings += [
-            r._replace(begin_us=r.begin_us + number * DAY_US, end_us=r.end_us + number * DAY_US)
+            r._replace(begin_us=r.begin_us + midnight_us, end_us=r.end_us + midnight_us)
             for r in of_day
         ]
     return ActivityLog(path, "homer", None, tuple(readings), tuple(notes))
@@ -254,7 +255,8 @@ def _rows(path: Path) -> list[_Row]:
                 f"{path}, line {number}: expected a start time, an end time, and an activity or a"
                 f" sensor with its type and place, got {one_line(text)!r}"
             )
-        begin, end = (parse_local_time(" ".join(match[i].split()), path, number) for i in (1, 2))
+        begin = parse_local_time(" ".join(match[1].split()), path, number)
+        end = parse_local_time(" ".join(match[2].split()), path, number)
         rows.append(_Row(begin, end, match[3].split(), number))
     if not rows:
         raise LogError(f"{path} holds no reading: is it the right file?")

@@ -266,7 +266,8 @@ def in_run(log: Log, day: Day, clock: Clock) -> tuple[Log, int, tuple[str, ...]]
     begin_us = micros(start - at_reading(start, midnight_of(start) - number * DAY))
     begins, ends = log.moments()
     end_us = begin_us + clock.steps * clock.step_us
-    first, last = int(begins.min()), int(ends.max())
+    first = int(begins.min())
+    last = int(ends.max())
     if last < begin_us or first >= end_us:
         since = f", from {log.first_day}" if log.first_day else ""
         of_log = f"{_moment(clock, first - begin_us)} to {_moment(clock, last - begin_us)}"
@@ -352,7 +353,8 @@ def in_order(readings: list[Reading], path: Path, *, sort: bool) -> tuple[list[R
     """
     if not readings:
         raise LogError(f"{path} holds no reading: is it the right file?")
-    first, last = min(r.begin_us for r in readings), max(r.end_us for r in readings)
+    first = min(r.begin_us for r in readings)
+    last = max(r.end_us for r in readings)
     LOG_DAYS.check((last - first) // DAY_US + 1, path, LogError)
     early = [b for a, b in pairwise(readings) if b.begin_us < a.begin_us]
     if early and not sort:

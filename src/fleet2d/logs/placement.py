@@ -126,7 +126,8 @@ class LogFrame(Settings):
     def to_plan(self, xy: F64) -> F64:
         """Return positions of the log, float64 (n, 2), as positions in the plan [m]."""
         (ax, ay), (bx, by) = self._factor()
-        x, y = xy[:, 0], -xy[:, 1] if self.flip_y else xy[:, 1]
+        x = xy[:, 0]
+        y = -xy[:, 1] if self.flip_y else xy[:, 1]
         return np.stack([ax * x - ay * y + bx, ay * x + ax * y + by], 1)
 
     def turn_headings(self, heading: F64) -> F64:
@@ -158,7 +159,8 @@ class LogFrame(Settings):
         sign = -1.0 if self.flip_y else 1.0
         log = [(match.log[0], sign * match.log[1]) for match in self.matches]
         plan = [match.plan for match in self.matches]
-        (lx, ly), (px, py) = _mean(log), _mean(plan)
+        lx, ly = _mean(log)
+        px, py = _mean(plan)
         ax = ay = size = 0.0
         for (x, y), (u, v) in zip(log, plan, strict=True):
             x = x - lx

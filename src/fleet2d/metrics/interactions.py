@@ -226,7 +226,8 @@ class TimingRegret(Metric):
                 self._open(event, life)
             elif isinstance(event, Event):
                 for request in self.open:
-                    if (request.wanted.robot, request.wanted.text) == (event.entity, event.detail):
+                    wanted = request.wanted
+                    if wanted.robot == event.entity and wanted.text == event.detail:
                         request.value = 0.0  # what was accepted wasn't carried out
             elif event is not None:
                 self._take_answer(event, life)

@@ -348,7 +348,8 @@ class LtpError(LongTermMetric):
         if presence is None:
             return None
         everybody = (*state.users, ANYONE)
-        rows = np.flatnonzero(counts[..., :-1].any(axis=-1).reshape(-1, len(everybody)).any(axis=0))
+        was_home = counts[..., :-1].any(axis=-1).reshape(-1, len(everybody))
+        rows = np.flatnonzero(was_home.any(axis=0))
         users = [everybody[row] for row in rows.tolist()]
         if not users:
             return None

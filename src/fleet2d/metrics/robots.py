@@ -214,7 +214,8 @@ class TimeToFind(Metric):
     def _driven(self, history: History, robot: str) -> F64:
         """Return the distance driven by a robot up to each step of the period [m]."""
         xy = history.poses(robot).xy
-        moves = np.diff(xy, axis=0, prepend=[self.last.get(robot, tuple(xy[0].tolist()))])
+        start = self.last.get(robot, tuple(xy[0].tolist()))
+        moves = np.diff(xy, axis=0, prepend=[start])
         self.last[robot] = history.poses(robot).at(-1)
         lengths = np.sqrt((moves * moves).sum(axis=1))
         return self.driven.get(robot, 0.0) + np.cumsum(lengths)

@@ -113,7 +113,8 @@ def groups_of(values: F64, masses: int = GROUP_COUNT) -> I64:
         [2, 0, 1, 1, 1, 0]
     """
     order = np.sort(values)
-    first, last = (np.searchsorted(order, values, side) for side in ("left", "right"))
+    first = np.searchsorted(order, values)
+    last = np.searchsorted(order, values, "right")
     return (first + last - 1) // 2 * masses // max(len(values), 1)
 
 
@@ -211,8 +212,8 @@ def reliability_curve(forecast: F64, true: F64, masses: int = GROUP_COUNT) -> tu
     group = groups_of(forecast, masses)
     counts = np.bincount(group, minlength=masses)
     size = counts[counts > 0]
-    sums = (np.bincount(group, values, masses)[counts > 0] for values in (forecast, true))
-    confidence, share = (total / size for total in sums)
+    confidence = np.bincount(group, forecast, masses)[counts > 0] / size
+    share = np.bincount(group, true, masses)[counts > 0] / size
     return confidence, share, size.astype(np.int64)
 
 

@@ -132,7 +132,8 @@ def starts(timing: "Timing", dawn: int) -> Distribution:
     at = seconds_of_day(timing.at, first)
     if timing.between is None:
         reach = int(REACH * spread)
-        first, last = max(at - reach, 0), at + reach
+        first = max(at - reach, 0)
+        last = at + reach
     begin = normal(at, spread) if spread else uniform(at, at)
     return begin.within(first, last)
 

@@ -302,6 +302,12 @@ class Estimator(Component):
         self.counts.recall(learned["counts"], today)
 
 
+def ratio(part: F64, whole: F64) -> F64:
+    """Return parts of wholes as shares of them; 0 where the whole is zero."""
+    is_some = whole > 0
+    return np.where(is_some, part / np.where(is_some, whole, 1), 0.0)
+
+
 def normalized(weights: F64) -> F64:
     """Divide weights by their sum over the last axis; uniform where that is zero.
 
@@ -361,9 +367,7 @@ class SightingShare(Estimator):
 
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return sightings per room by all, and bins without a sighting by bins with a view."""
-        watched = sums[..., -3]
-        away = np.where(watched > 0, sums[..., -2] / np.where(watched > 0, watched, 1), 0.0)
-        return normalized(sums[..., :-3]), away
+        return normalized(sums[..., :-3]), ratio(sums[..., -2], sums[..., -3])
 
 
 def array_of(

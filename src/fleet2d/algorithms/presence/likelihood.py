@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from fleet2d.algorithms.evidence import Evidence
-from fleet2d.algorithms.presence.estimator import MIN_DAYS, Estimator, normalized
+from fleet2d.algorithms.presence.estimator import MIN_DAYS, Estimator, normalized, ratio
 from fleet2d.algorithms.presence.people import People, Prior, StateLayout, day_evidence, joined
 from fleet2d.configuration.units import Share
 from fleet2d.errors import ComponentError
@@ -103,9 +103,8 @@ class Likelihood(Estimator):
     def shares(self, sums: F64) -> tuple[F64, F64]:
         """Return the expected share of rooms given at home, and of away."""
         rooms = (sums.shape[-1] - 3) // 2
-        bins = sums[..., -1]
-        away = np.where(bins > 0, sums[..., rooms] / np.where(bins > 0, bins, 1), 0.0)
-        return normalized(np.maximum(sums[..., :rooms], 0)), np.minimum(np.maximum(away, 0), 1)
+        away = ratio(sums[..., rooms], sums[..., -1])
+        return normalized(np.maximum(sums[..., :rooms], 0)), np.clip(away, 0, 1)
 
     def interval(self, key: np.uint64, level: float) -> tuple[F64, F64]:
         """Return intervals for the shares of time in each room, over the time so far.

@@ -266,7 +266,8 @@ class BeliefTable(RealTimePresence):
         every = whole_steps(self.every, step_us, f"{state.path}.every", ComponentError)
         if every % bin_steps:
             raise ComponentError(f"{state.path}.every must be a whole number of minutes")
-        first, end = evidence.begin, evidence.begin + len(evidence) * bin_steps
+        first = evidence.begin
+        end = evidence.begin + len(evidence) * bin_steps
         due = np.arange(first // every + 1, end // every + 1) * every
         bins = (due - first) // bin_steps  # that are over by then
         # With islands, the rooms watched in the whole evidence bound the places of people.
@@ -282,15 +283,15 @@ class BeliefTable(RealTimePresence):
             home = track.home[bins - 1]
             away = track.away[bins - 1]
         else:
-            home, away = map(np.array, zip(*(b.arrays for b in beliefs[: len(due)]), strict=True))
+            in_time = [belief.arrays for belief in beliefs[: len(due)]]
+            home, away = map(np.array, zip(*in_time, strict=True))
         names = (*state.users, ANYONE)
         places = (*(room.name for room in self.home.rooms), AWAY)
-        columns = belief_labels(names, places)
-        return {
-            "at": np.repeat(due - 1, len(names) * len(places)),
-            **{name: np.tile(column, len(due)) for name, column in columns.items()},
-            "share": np.concatenate([home, away[..., np.newaxis]], axis=2).ravel(),
-        }
+        labels = belief_labels(names, places)
+        columns = {"at": np.repeat(due - 1, len(names) * len(places))}
+        columns |= {name: np.tile(label, len(due)) for name, label in labels.items()}
+        columns["share"] = np.concatenate([home, away[..., np.newaxis]], axis=2).ravel()
+        return columns
 
 
 class Told(NamedTuple):

@@ -195,7 +195,8 @@ def _too_small(box: Patch, cell: float) -> bool:
 
 def _overlaps(frame: I64, frames: I64) -> F64:
     """Return the intersection of a frame with each of others, as a share of their union."""
-    low, high = np.maximum(frame[:2], frames[:, :2]), np.minimum(frame[2:], frames[:, 2:])
+    low = np.maximum(frame[:2], frames[:, :2])
+    high = np.minimum(frame[2:], frames[:, 2:])
     common = np.clip(high - low, 0, None).prod(axis=1)
     areas = (frames[:, 2:] - frames[:, :2]).prod(axis=1)
     return common / ((frame[2:] - frame[:2]).prod() + areas - common)
@@ -234,7 +235,8 @@ def _blocks(
 
 def _window(frames: I64) -> tuple[slice, slice]:
     """Return the rows and columns of the smallest window that holds all frames."""
-    (row, column), (end_row, end_column) = frames[:, :2].min(axis=0), frames[:, 2:].max(axis=0)
+    row, column = frames[:, :2].min(axis=0)
+    end_row, end_column = frames[:, 2:].max(axis=0)
     return slice(int(row), int(end_row)), slice(int(column), int(end_column))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
-from fleet2d.floorplan.mesh import Segment
+from fleet2d.floorplan.mesh import Segment, cross_products
 from fleet2d.floorplan.placed_objects import Point
 from fleet2d.kernels import F64, I16, I64, Bool
 
@@ -212,7 +212,8 @@ def _jamb(corners: F64, ring_of: I64, start: F64, end: F64, far: F64) -> tuple[i
     """
     begins = corners[:-1]
     ends = corners[1:]
-    least, most = np.minimum(start, far), np.maximum(start, far)
+    least = np.minimum(start, far)
+    most = np.maximum(start, far)
     is_near = ((np.minimum(begins, ends) <= most) & (np.maximum(begins, ends) >= least)).all(axis=1)
     is_near &= ring_of[:-1] == ring_of[1:]
     hits = _crossings(begins[is_near], ends[is_near], start, far)
@@ -248,11 +249,12 @@ def _with_corner(polygon: Polygon, point: F64) -> tuple[Polygon, bool]:
     """
     rings = shapely.get_rings(polygon)
     corners, ring_of = shapely.get_coordinates(rings, return_index=True)
-    if ((corners[:, 0] == point[0]) & (corners[:, 1] == point[1])).any():
+    if (corners == point).all(axis=1).any():
         return polygon, True
     first = np.flatnonzero(ring_of[:-1] == ring_of[1:])  # a wall goes from a corner to the next
     sides = np.stack([corners[first], corners[first + 1]], axis=1)
-    low, high = sides.min(axis=1), sides.max(axis=1)
+    low = sides.min(axis=1)
+    high = sides.max(axis=1)
 
     def walls_near(least: F64, most: F64) -> I64:
         return np.flatnonzero(((low <= most) & (high >= least)).all(axis=1))
@@ -316,7 +318,8 @@ def rooms_beside(lattice: Lattice, room_of_place: I16, segment: Segment) -> tupl
         room = -1
         for step in BESIDE_M:
             reach = side * step * lattice.units_per_m / length
-            x, y = round((x0 + x1) / 2 - dy * reach), round((y0 + y1) / 2 + dx * reach)
+            x = round((x0 + x1) / 2 - dy * reach)
+            y = round((y0 + y1) / 2 + dx * reach)
             row, column = lattice.cell_of(x, y)
             if 0 <= row < lattice.rows and 0 <= column < lattice.columns:
                 other = int(room_of_place[row, column])
@@ -418,8 +421,7 @@ def _crosses(first: I64, step: I64, passage: Segment) -> Bool:
     along = np.array(passage[1]) - start
 
     def side(origin: I64, direction: I64, point: I64) -> I64:
-        gap = point - origin
-        return np.sign(direction[..., 0] * gap[..., 1] - direction[..., 1] * gap[..., 0])
+        return np.sign(cross_products(direction, point - origin))
 
     meets_line = side(start, along, first) * side(start, along, first + step) <= 0
     meets_segment = side(first, step, start) * side(first, step, start + along) <= 0

@@ -177,7 +177,8 @@ class Patch:
         first = np.array([self.window[0].start, self.window[1].start])
         if len(rows) == 0:
             return np.concatenate([first, first])
-        low, high = np.array([rows[0], columns[0]]), np.array([rows[-1], columns[-1]]) + 1
+        low = np.array([rows[0], columns[0]])
+        high = np.array([rows[-1], columns[-1]]) + 1
         return np.concatenate([first + low, first + high])
 
 
@@ -454,7 +455,8 @@ def _room(
     inside = room_of_cell[row0:row1, column0:column1] == index
     depth = squared_distance(np.pad(inside, 1))
     deepest = np.unravel_index(np.argmax(depth), depth.shape)  # the first of equals
-    row, column = row0 + int(deepest[0]) - 1, column0 + int(deepest[1]) - 1
+    row = row0 + int(deepest[0]) - 1
+    column = column0 + int(deepest[1]) - 1
     x, y = lattice.to_metres(lattice.cell_centre(row, column)).tolist()
     corners = np.array([(column0, row0), (column1, row1)]) * UNITS_PER_CELL
     (x0, y0), (x1, y1) = lattice.to_metres(corners).tolist()

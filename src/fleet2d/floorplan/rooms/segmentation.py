@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from fleet2d.floorplan.lattice import UNITS_PER_CELL, Lattice
-from fleet2d.floorplan.mesh import Gates, Segment, build_mesh
+from fleet2d.floorplan.mesh import Gates, Segment, build_mesh, doubled_areas
 from fleet2d.floorplan.rooms.doorways import MIN_APART_M
 from fleet2d.floorplan.rooms.shape import ACROSS_SHARE, LONG, by_size, without_furniture
 from fleet2d.kernels import (
@@ -500,10 +500,8 @@ def _sides(
 
 def _areas(mesh: Mesh, part: I32) -> F64:
     """Return the area of each part, square lattice units."""
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
-    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     total = np.zeros(int(part.max()) + 1, np.int64)
-    np.add.at(total, part, doubled)
+    np.add.at(total, part, doubled_areas(mesh.vertices[mesh.triangles]))
     return total / 2
 
 

@@ -97,7 +97,8 @@ def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, st
         (_, _, data), *_ = deque(reader.messages([connection]), maxlen=1)
         message = reader.deserialize(data, connection.msgtype)
     info = message.info
-    rows, columns = int(info.height), int(info.width)
+    rows = int(info.height)
+    columns = int(info.width)
     side = float(np.float32(info.resolution)) * scale
     cells = np.asarray(message.data, np.int8)
     if len(cells) != rows * columns or not rows * columns or not 0 < side <= 1:
@@ -108,7 +109,8 @@ def _read(path: Path, topic: str | None, scale: float) -> tuple[OccupancyMap, st
     PIXELS.check(rows * columns, f"{path}: the map of {topic}", FloorPlanError)
     corner = numbers_of(info.origin.position, info.origin.orientation)
     heading = float(np.nan_to_num(headings_of(np.array([corner[3:]])))[0])  # many leave it out
-    x, y = corner[0] * scale, corner[1] * scale
+    x = corner[0] * scale
+    y = corner[1] * scale
     if not max(abs(x), abs(y)) <= MAX_COORDINATE_M:
         raise FloorPlanError(
             f"{path}: the map of {topic} is damaged: its corner is at ({corner[0]:g},"

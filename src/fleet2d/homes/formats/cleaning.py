@@ -54,7 +54,8 @@ class OccupancyMap:
     def to_metres(self, xy: F64) -> F64:
         """Return places (column, row) from the lower left corner in metres (…, 2)."""
         cosine, sine = self.turn
-        x, y = xy[..., 0] * self.pixel, xy[..., 1] * self.pixel
+        x = xy[..., 0] * self.pixel
+        y = xy[..., 1] * self.pixel
         turned = np.stack([x * cosine - y * sine, x * sine + y * cosine], axis=-1)
         return turned + np.array(self.origin)
 
@@ -105,14 +106,17 @@ def bridge_gaps(
     gap, first, second = _find_gaps(part, roomy, raw.free, widest)
     places = []
     owner = np.arange(len(roomy))
+
+    def area_with(part: int) -> float:
+        return float(areas[owner == owner[part]].sum())
+
     for strip, least_m2 in _candidates(raw, gap, evidence):
         pixels = tuple(strip.T)
         pairs = np.unique(np.stack([first[pixels], second[pixels]], axis=1), axis=0)
         joins = [
             (a, b)
             for a, b in pairs.tolist()
-            if owner[a] != owner[b]
-            and min(areas[owner == owner[a]].sum(), areas[owner == owner[b]].sum()) >= least_m2
+            if owner[a] != owner[b] and min(area_with(a), area_with(b)) >= least_m2
         ]
         for a, b in joins:
             owner[owner == owner[b]] = owner[a]
@@ -202,7 +206,8 @@ def _find_gaps(
     for length in range(1, math.ceil(widest * math.sqrt(2)) + 1):
         for axis in (0, 1):
             along = np.moveaxis(part, axis, 0)
-            before, after = along[: -length - 1], along[length + 1 :]
+            before = along[: -length - 1]
+            after = along[length + 1 :]
             between = [slice(k, k + len(before)) for k in range(1, length + 1)]
             is_gap = (before >= 0) & (after >= 0) & (before != after)
             is_gap[is_gap] = roomy[before[is_gap]] & roomy[after[is_gap]]
@@ -213,7 +218,8 @@ def _find_gaps(
                 if length > widest:
                     to_side2 = squared_distance(~free) if to_side2 is None else to_side2
                     is_gap &= np.moveaxis(to_side2, axis, 0)[window] < ((length + 1) // 2) ** 2
-            low, high = np.minimum(before, after), np.maximum(before, after)
+            low = np.minimum(before, after)
+            high = np.maximum(before, after)
             for window in between:
                 new = is_gap & (np.moveaxis(gap, axis, 0)[window] == 0)
                 np.moveaxis(gap, axis, 0)[window][new] = min(length, widest)

@@ -127,7 +127,7 @@ def _row_gaps(
 ) -> Iterator[tuple[tuple[int, int, int, int], bool]]:
     """Yield the gaps along rows: rows with the same two sides, as many as a wall is thick."""
     rows, starts, ends = _runs(walls, WINDOW_M / pixel)
-    drawn = np.concatenate([np.zeros((len(dark), 1), np.int64), dark.cumsum(axis=1)], axis=1)
+    drawn = np.pad(dark.cumsum(axis=1), ((0, 0), (1, 0)))
     joined = drawn[rows, ends] - drawn[rows, starts] >= JOINED_SHARE * (ends - starts)
     ragged = max(round(RAGGED_M / pixel), 1)
     thickest = WALL_M / pixel
@@ -149,7 +149,8 @@ def _row_gaps(
             recent.append([row, start, end, row, is_joined])
             groups.append(recent[-1])
     for top, left, right, last, is_window in groups:
-        height, width = last + 1 - top, right - left
+        height = last + 1 - top
+        width = right - left
         if 2 <= height <= thickest and (is_window or width <= door) and width > ragged:
             yield (top, left, last + 1, right), bool(is_window)
 

@@ -317,7 +317,8 @@ def _inside(lines: list[F64], notes: list[str]) -> tuple[MultiPolygon, list[tupl
     ways = []
     for gap in gaps:
         corners = shapely.get_coordinates(gap)
-        outer, inner = corners[:2].mean(axis=0), corners[2:4].mean(axis=0)
+        outer = corners[:2].mean(axis=0)
+        inner = corners[2:4].mean(axis=0)
         inward = (inner - outer) / max(float(np.hypot(*(inner - outer))), 1e-9)
         at = Point(inner + INSIDE_M * inward)
         if free.contains(at):

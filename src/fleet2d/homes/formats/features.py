@@ -320,7 +320,8 @@ class Draft:
             for step in range(1, steps + 1):
                 for shift in (step, -step):
                     away = (end - start) * shift / steps
-                    (x0, y0), (x1, y1) = (start + away).tolist(), (end + away).tolist()
+                    x0, y0 = (start + away).tolist()
+                    x1, y1 = (end + away).tolist()
                     passage = find_passage(self.free, (x0, y0), (x1, y1))
                     if passage and passage.through and self.free.covers(passage.thresholds):
                         return passage

@@ -141,7 +141,8 @@ def _features(model: Any, heights: Mapping[str, float], notes: list[str]) -> Ite
             continue
         key = _storey_of(element, heights)
         floor = heights.get(key or "", 0.0)
-        low, high = float(points[:, 2].min()) - floor, float(points[:, 2].max()) - floor
+        low = float(points[:, 2].min()) - floor
+        high = float(points[:, 2].max()) - floor
         if low > HIGHEST.get(kind, np.inf):
             continue
         if kind == "opening" and (low > WAY_M[0] or high < WAY_M[1]):
@@ -188,12 +189,19 @@ def _geometry(element: Any) -> tuple[F64, I64]:
 
 def _way_up(points: F64, heights: Mapping[str, float]) -> dict[str, Any]:
     """Return the storey that stairs lead to, and the middle of their first and last steps."""
-    low, high = float(points[:, 2].min()), float(points[:, 2].max())
+    low = float(points[:, 2].min())
+    high = float(points[:, 2].max())
     above = {key: height for key, height in heights.items() if height > low + WAY_M[1]}
-    ends = [points[points[:, 2] <= low + STEP_M], points[points[:, 2] >= high - STEP_M]]
-    foot, head = (tuple(((end.min(axis=0) + end.max(axis=0)) / 2)[:2].tolist()) for end in ends)
+    foot = _middle(points[points[:, 2] <= low + STEP_M])
+    head = _middle(points[points[:, 2] >= high - STEP_M])
     upper = min(above, key=lambda key: abs(above[key] - high), default=None)
     return {"foot": foot, "head": head, "upper": upper}
+
+
+def _middle(points: F64) -> tuple[float, ...]:
+    """Return the middle (x, y) of the box around points."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return tuple(middle[:2].tolist())
 
 
 def _height(storey: Any) -> float:

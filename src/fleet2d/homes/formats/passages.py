@@ -82,13 +82,16 @@ class Passage:
         return (x0 + x1) / 2, (y0 + y1) / 2
 
     def _between(self, low: float, high: float) -> Polygon:
-        (a, b), (d, c) = self._beside(low), self._beside(high)
+        a, b = self._beside(low)
+        d, c = self._beside(high)
         return Polygon([a, b, c, d])
 
     def _beside(self, offset: float) -> tuple[Point, Point]:
-        start, end = np.array(self.start), np.array(self.end)
+        start = np.array(self.start)
+        end = np.array(self.end)
         shift = offset * _normal(start, end)
-        (x0, y0), (x1, y1) = (start + shift).tolist(), (end + shift).tolist()
+        x0, y0 = (start + shift).tolist()
+        x1, y1 = (end + shift).tolist()
         return (x0, y0), (x1, y1)
 
 
@@ -110,7 +113,8 @@ def find_passage(free: MultiPolygon, start: Point, end: Point) -> Passage | None
 
     Where no wall is near, in open space, the passage has no depth.
     """
-    first, last = np.array(start), np.array(end)
+    first = np.array(start)
+    last = np.array(end)
     if not ((last - first) ** 2).sum() > 0:
         return None
     normal = _normal(first, last)
@@ -131,7 +135,8 @@ def find_passage(free: MultiPolygon, start: Point, end: Point) -> Passage | None
                 return Passage(start, end, *one_sided[0], False) if one_sided else None
         if inner:
             spans.append(min(inner, key=lambda wall: max(wall[0], -wall[1])))
-    low, high = min(low for low, _ in spans), max(high for _, high in spans)
+    low = min(low for low, _ in spans)
+    high = max(high for _, high in spans)
     return Passage(start, end, low, high, True)
 
 
@@ -184,7 +189,8 @@ def _walls_across(free: BaseGeometry, at: F64, normal: F64) -> list[tuple[float,
         if part.is_empty:
             continue
         offsets = (shapely.get_coordinates(part) - at) @ normal
-        low, high = float(offsets.min()), float(offsets.max())
+        low = float(offsets.min())
+        high = float(offsets.max())
         low = -np.inf if low < _OVER - MAX_WALL_M else low
         high = np.inf if high > MAX_WALL_M - _OVER else high
         if high > low:
@@ -198,7 +204,8 @@ def _middle_lines(corners: F64, along: F64) -> list[tuple[Point, Point]]:
     axes = (along, np.array([-along[1], along[0]]))
     spans = [(float((corners @ axis).min()), float((corners @ axis).max())) for axis in axes]
     for number, axis in enumerate(axes):
-        (low, high), (left, right) = spans[number], spans[1 - number]
+        low, high = spans[number]
+        left, right = spans[1 - number]
         aside = (left + right) / 2 * axes[1 - number]
         middle_lines.append((high - low, _ends(low * axis + aside, high * axis + aside)))
     return [line for _, line in sorted(middle_lines, key=lambda pair: -pair[0])]
@@ -210,5 +217,6 @@ def _normal(start: F64, end: F64) -> F64:
 
 
 def _ends(start: F64, end: F64) -> tuple[Point, Point]:
-    (x0, y0), (x1, y1) = start.tolist(), end.tolist()
+    x0, y0 = start.tolist()
+    x1, y1 = end.tolist()
     return (x0, y0), (x1, y1)

@@ -122,7 +122,8 @@ class _Surface(BaseModel):
         """Its corners on the floor (x, y), float64 (n, 2) [m]: two ends unless it is curved."""
         if self.curve is None:
             return self.line
-        first, last = self.curve.startAngle, self.curve.endAngle
+        first = self.curve.startAngle
+        last = self.curve.endAngle
         count = max(math.ceil(abs(last - first) / CURVE_STEP), 2)
         angles = [first + (last - first) * k / count for k in range(count + 1)]
         x, z = self.curve.center

@@ -208,7 +208,8 @@ def _way(
     feature: Feature, storeys: tuple[Storey, Storey], shifts: tuple[float, float], metre: float
 ) -> Iterator[Feature]:
     """Yield the portal of stairs or a lift, and where robots keep off stairs on both storeys."""
-    foot, head = feature.properties.get("foot"), feature.properties.get("head")
+    foot = feature.properties.get("foot")
+    head = feature.properties.get("head")
     lift = feature.kind == "lift"
     if lift:
         at = np.asarray(feature.shape.representative_point().coords)[0]
@@ -237,8 +238,9 @@ def _short_sides(shape: BaseGeometry, metre: float) -> tuple[F64, F64]:
     """
     corners = shapely.get_coordinates(shape.minimum_rotated_rectangle)[:4]
     middle = corners.mean(axis=0)
-    sides = [(corners[k] + corners[(k + 1) % 4]) / 2 for k in range(4)]
-    lengths = [float(np.hypot(*(corners[(k + 1) % 4] - corners[k]))) for k in range(4)]
+    ends = np.roll(corners, -1, axis=0)
+    sides = (corners + ends) / 2
+    lengths = np.hypot(*(ends - corners).T)
     first = 0 if lengths[0] <= lengths[1] else 1
     before = []
     for side in (sides[first], sides[first + 2]):

@@ -183,7 +183,8 @@ def _arc(ends: list[tuple[float, float]], extent: float) -> LineString:
     corners = [start]
     for k in range(1, count):
         turn = -extent * k / count
-        cosine, sine = math.cos(turn), math.sin(turn)
+        cosine = math.cos(turn)
+        sine = math.sin(turn)
         turned = np.array([[cosine, -sine], [sine, cosine]]) @ arm
         corners.append(centre + turned)
     return LineString(np.round([*corners, end], 4))
@@ -195,7 +196,8 @@ def _box(element: ET.Element) -> Polygon:
     half = np.array([side / CM_PER_M / 2 for side in sides])
     corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     turn = -_number(element, "angle")
-    cosine, sine = math.cos(turn), math.sin(turn)
+    cosine = math.cos(turn)
+    sine = math.sin(turn)
     centre = _metres([(_number(element, "x"), _number(element, "y"))])[0]
     return Polygon(np.round(corners @ np.array([[cosine, sine], [-sine, cosine]]) + centre, 4))
 

@@ -37,6 +37,7 @@ from fleet2d.floorplan.placed_objects import PlacedObject, UsePlace, distinct_na
 from fleet2d.floorplan.plan import FloorPlan, LabelledRegion
 from fleet2d.floorplan.rooms.room import UNKNOWN, usual_type
 from fleet2d.homes.formats.cleaning import OccupancyMap, bridge_gaps, drop_rays, drop_scraps
+from fleet2d.homes.formats.enclosure import parts_of
 from fleet2d.homes.formats.occupancy import outline
 from fleet2d.homes.formats.pixels import PixelSource
 from fleet2d.homes.formats.rand256 import (
@@ -100,7 +101,9 @@ class PixelBox:
         Raises:
             FloorPlanError: It is too large for a home.
         """
-        column, row, end = int(runs[:, 0].min()), int(runs[:, 1].min()), runs[:, 0] + runs[:, 2]
+        column = int(runs[:, 0].min())
+        row = int(runs[:, 1].min())
+        end = runs[:, 0] + runs[:, 2]
         box = cls(column, row, int(end.max()) - column, int(runs[:, 1].max()) + 1 - row)
         if box.columns * box.rows > MAX_PIXELS:
             raise FloorPlanError(
@@ -111,13 +114,15 @@ class PixelBox:
 
     def window(self, part: "PixelBox") -> tuple[slice, slice]:
         """Return the slices of `part` in an array over this box."""
-        row, column = part.row - self.row, part.column - self.column
+        row = part.row - self.row
+        column = part.column - self.column
         return slice(row, row + part.rows), slice(column, column + part.columns)
 
     def paint(self, runs: I64) -> Bool:
         """Return the pixels that the runs cover, bool (rows, columns), first row at the bottom."""
         steps = np.zeros((self.rows, self.columns + 1), np.int32)
-        row, column = runs[:, 1] - self.row, runs[:, 0] - self.column
+        row = runs[:, 1] - self.row
+        column = runs[:, 0] - self.column
         np.add.at(steps, (row, column), 1)
         np.add.at(steps, (row, column + runs[:, 2]), -1)
         return np.cumsum(steps, axis=1)[:, :-1] > 0
@@ -168,7 +173,8 @@ def note_size(content: dict[str, Any], box: PixelBox, notes: list[str]) -> None:
     if not sides or any(type(n) not in (int, float) or not 0 < n < 1e9 for n in sides):
         raise FloorPlanError(f"size is {shown_value(size)}: x and y in centimetres are expected")
     columns, rows = (n / CM_PER_M / pixel_side(content) for n in sides)
-    right, bottom = box.column + box.columns, -box.row
+    right = box.column + box.columns
+    bottom = -box.row
     if min(box.column, -(box.row + box.rows)) < 0 or right > columns + 1 or bottom > rows + 1:
         notes.append(
             f"its pixels reach beyond its size of {sides[0]:g} x {sides[1]:g} cm: is a layer"
@@ -543,12 +549,8 @@ def _regions(
         if (added == index).any():
             shape = shapely.union(shape, _in_metres(added == index, box, pixel_m))
         kind = usual_type(layer.name) if layer.is_named else UNKNOWN
-        regions.append(LabelledRegion((layer.name,), MultiPolygon(_polygons(shape)), name, kind))
+        regions.append(LabelledRegion((layer.name,), MultiPolygon(parts_of(shape)), name, kind))
     return regions
-
-
-def _polygons(shape: BaseGeometry) -> list[Polygon]:
-    return [part for part in shapely.get_parts(shape).tolist() if part.geom_type == "Polygon"]
 
 
 # --- No-go areas and the charger ----------------------------------------------------------------
@@ -597,7 +599,7 @@ def _no_go_shape(corners: F64, kind: str) -> BaseGeometry:
 def _parts_in_metres(shape: BaseGeometry, pixel_m: float) -> list[Polygon]:
     # Rounded, so that the last bits of a machine's arithmetic don't matter.
     metres = shapely.transform(shape, lambda xy: np.round(xy * pixel_m, 6))
-    return _polygons(metres)
+    return parts_of(metres)
 
 
 def _remove_pixels(shape: BaseGeometry, free: Bool, box: PixelBox) -> None:
@@ -609,7 +611,8 @@ def _remove_pixels(shape: BaseGeometry, free: Bool, box: PixelBox) -> None:
     shapely.prepare(shape)
     for row in range(first, last + 1):  # by rows, to save memory
         columns = left + np.flatnonzero(free[row, left : right + 1])
-        x, y = columns + float(box.column), np.full(len(columns), float(box.row + row))
+        x = columns + float(box.column)
+        y = np.full(len(columns), float(box.row + row))
         pixels = shapely.box(*np.stack([x, y, x + 1, y + 1]))
         free[row, columns] = ~shapely.intersects(shape, pixels)
 
@@ -619,7 +622,9 @@ def _charger(content: dict[str, Any], free: Bool, box: PixelBox) -> list[PlacedO
     at = read_charger(content)
     if at is None:
         return []
-    (x, y), pixel_m, half = at, pixel_side(content), CHARGER_M / 2
+    x, y = at
+    pixel_m = pixel_side(content)
+    half = CHARGER_M / 2
     roomy = squared_distance(np.pad(free, 1))[1:-1, 1:-1] >= (STAND_RADIUS_M / pixel_m) ** 2
     rows, columns = np.nonzero(roomy)
     stand_x, stand_y = ((n + 0.5) * pixel_m for n in (columns + box.column, rows + box.row))
@@ -628,7 +633,8 @@ def _charger(content: dict[str, Any], free: Bool, box: PixelBox) -> list[PlacedO
     front = 0.0
     uses = tuple[UsePlace, ...]()
     if nearest is not None and away[nearest] <= STAND_REACH_M**2:
-        to_x, to_y = round(float(stand_x[nearest]), 6), round(float(stand_y[nearest]), 6)
+        to_x = round(float(stand_x[nearest]), 6)
+        to_y = round(float(stand_y[nearest]), 6)
         # Rounded, so that the last bit of a machine's arctangent doesn't matter.
         front = round(math.atan2(to_y - y, to_x - x), 6)
         uses = (UsePlace(to_x, to_y, round(math.atan2(y - to_y, x - to_x), 6)),)

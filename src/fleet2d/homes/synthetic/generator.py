@@ -318,8 +318,10 @@ def shape_cost(layout: RoomLayout, ease: float) -> float:
             raise MisfitError
         excess = max(ratio - _COMFORTABLE_RATIO, 0.0)
         cost += excess * excess * (2.0 if kind in _LIT else 0.7)
-    x0, y0 = min(b.x0 for b in layout.boxes), min(b.y0 for b in layout.boxes)
-    x1, y1 = max(b.x1 for b in layout.boxes), max(b.y1 for b in layout.boxes)
+    x0 = min(b.x0 for b in layout.boxes)
+    y0 = min(b.y0 for b in layout.boxes)
+    x1 = max(b.x1 for b in layout.boxes)
+    y1 = max(b.y1 for b in layout.boxes)
     short, long = sorted((x1 - x0, y1 - y0))
     if long > MAX_ASPECT * short:
         raise MisfitError
@@ -679,7 +681,8 @@ def draw_shafts(layout: RoomLayout, gaps: Sequence[Gap], choices: Choices) -> li
 def _near(shaft: Rectangle, gap: Gap) -> bool:
     """Return whether a passage is less than a robot's width away from a shaft."""
     wall = gap.wall
-    low, high = gap.low - SHAFT_CLEARANCE, gap.high + SHAFT_CLEARANCE
+    low = gap.low - SHAFT_CLEARANCE
+    high = gap.high + SHAFT_CLEARANCE
     near = wall.at - SHAFT_CLEARANCE
     far = wall.at + SHAFT_CLEARANCE
     return overlap(shaft, (near, low, far, high) if wall.upright else (low, near, high, far))

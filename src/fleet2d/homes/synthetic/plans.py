@@ -96,7 +96,8 @@ class Sketch:
 
     def __init__(self, request: LayoutRequest, choices: Choices) -> None:
         """Group the rooms by where they may go."""
-        self.request, self.choices = request, choices
+        self.request = request
+        self.choices = choices
         self.briefs = list(request.briefs)
         self.areas = {i: brief.area for i, brief in enumerate(self.briefs)}  # [m²]
         self.gross = np.array([gross_area(area) for area in self.areas.values()])
@@ -183,7 +184,8 @@ class Sketch:
                 continue
             trees += [Cut(across, (kitchen, living)), Cut(across, (living, kitchen))]
             share = choices.between(45, 65)
-            low, high = Leaf(living.room, share), Leaf(living.room, 100 - share)
+            low = Leaf(living.room, share)
+            high = Leaf(living.room, 100 - share)
             trees.append(Cut(across, (low, Cut(not across, (kitchen, high)))))
         return choices.shuffled(trees)[: max(5, len(trees) * 5 // 6)]
 
@@ -200,7 +202,8 @@ class Sketch:
         """Draw a block of garage and what is beside it."""
         if not self.service:
             return None
-        choices, (garage, *others) = self.choices, map(Leaf, self.service)
+        choices = self.choices
+        garage, *others = map(Leaf, self.service)
         trees: list[Tree] = []
         for across in (True, False):
             rest = others[0] if len(others) == 1 else Cut(not across, tuple(others))
@@ -279,7 +282,8 @@ class Sketch:
             entry: The group that begins the front, or None.
             suite: Whether the main bedroom ends the back.
         """
-        choices, (main, *others) = self.choices, groups
+        choices = self.choices
+        main, *others = groups
         first = [entry] if entry else []
         front: list[RoomGroup] = []
         back: list[RoomGroup] = []
@@ -323,7 +327,8 @@ class Sketch:
 
         def place(areas: Areas) -> list[Box]:
             rooms = wing.place(areas)
-            low, high = rooms.low - below, rooms.high + above
+            low = rooms.low - below
+            high = rooms.high + above
             left = -_core_width(core, areas, high - low)
             boxes = rooms.boxes + core.squarest(areas, (left, low, 0, high), [mouth])
             return boxes + (service.boxes(areas, left, low, high) if service else [])
@@ -348,7 +353,9 @@ class Sketch:
             else:
                 out = choices.between(24, 44) * (1 if outline == "bar" else -1)
             return (out, 0) if side else (0, out)
-        low, high = (choices.weighted(((0, 30), (1, 35), (-1, 35))) for _ in range(2))
+        steps = ((0, 30), (1, 35), (-1, 35))
+        low = choices.weighted(steps)
+        high = choices.weighted(steps)
         if low == -1 and high == -1:
             low = 0
         return low * step, high * choices.between(24, 64)
@@ -401,7 +408,8 @@ class Sketch:
 
         def place(areas: Areas) -> list[Box]:
             east = first.place(areas)
-            low, high = east.low - below, east.high + above
+            low = east.low - below
+            high = east.high + above
             # The second wing is as deep as the core, or else as the first wing.
             west = _fit_wing(second, areas, *((low, high) if as_core else (east.low, east.high)))
             left = -_core_width(core, areas, high - low)

@@ -265,7 +265,8 @@ def _check(area: float, beds: int, baths: int, garage: bool, wishes: Wishes) -> 
             f"a synthetic home with {counted(beds, 'bedroom')} has at most {beds + 2} bathrooms,"
             f" not {baths}: give it more bedrooms (floorplan.bedrooms) or fewer bathrooms"
         )
-    least, most = minimum_area(beds, baths, garage), maximum_area(beds, baths)
+    least = minimum_area(beds, baths, garage)
+    most = maximum_area(beds, baths)
     rooms = f"{counted(beds, 'bedroom')} and {counted(baths, 'bathroom')}"
     if garage:
         rooms += " and a garage"

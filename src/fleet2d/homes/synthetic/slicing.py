@@ -130,10 +130,12 @@ def inner_walls(boxes: Sequence[Box]) -> list[Wall]:
     walls = []
     for (i, a), (j, b) in combinations(enumerate(boxes), 2):
         if a.x1 == b.x0 or b.x1 == a.x0:
-            low, high = max(a.y0, b.y0), min(a.y1, b.y1) - WALL
+            low = max(a.y0, b.y0)
+            high = min(a.y1, b.y1) - WALL
             pair = (i, j, True, a.x1) if a.x1 == b.x0 else (j, i, True, b.x1)
         elif a.y1 == b.y0 or b.y1 == a.y0:
-            low, high = max(a.x0, b.x0), min(a.x1, b.x1) - WALL
+            low = max(a.x0, b.x0)
+            high = min(a.x1, b.x1) - WALL
             pair = (i, j, False, a.y1) if a.y1 == b.y0 else (j, i, False, b.y1)
         else:
             continue
@@ -187,7 +189,8 @@ def turn_boxes(boxes: Sequence[Box], orientation: int) -> list[Box]:
         oriented = [box.flipped() for box in oriented]
     if orientation & 4:
         oriented = [box.turned() for box in oriented]
-    x0, y0 = min(b.x0 for b in oriented), min(b.y0 for b in oriented)
+    x0 = min(b.x0 for b in oriented)
+    y0 = min(b.y0 for b in oriented)
     return [box.moved(-x0, -y0) for box in oriented]
 
 

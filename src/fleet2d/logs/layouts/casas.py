@@ -126,7 +126,8 @@ def _activity(text: str, under_way: list[str]) -> str:
     match = _MARK.fullmatch(text)
     if match is None:
         return text or (under_way[-1] if under_way else "")
-    name, mark = match[1].strip(), match[2].lower()
+    name = match[1].strip()
+    mark = match[2].lower()
     if mark in ("begin", "start"):
         under_way.append(name)
         return name

@@ -47,7 +47,8 @@ def read_openshs(path: Path, *, sort: bool = False, zone: Zone | None = None) ->
     low = [name.strip().lower() for name in head]
     if "timestamp" not in low or "activity" not in low:
         raise LogError(f"{path}: expected columns for sensors, Activity and timestamp in line 1")
-    time_at, activity_at = low.index("timestamp"), low.index("activity")
+    time_at = low.index("timestamp")
+    activity_at = low.index("activity")
     sensors = [k for k in range(len(head)) if k not in (time_at, activity_at) and low[k]]
     readings: list[Reading] = []
     begun: dict[str, int] = {}  # the number of the reading that goes on, by label
