@@ -266,7 +266,8 @@ def test_an_empty_battery_switches_it_off_and_the_charger_on_again():
         f"{on + 1} localization_lost",
         f"{on + 61} relocalized",
     ] == told
-    uptime = {"on": 1 - (on - off) / 3900, "longest": on - off, "empty": 86400 / 3900}
+    never = dict.fromkeys(("off", "crash", "update"), 0)
+    uptime = {"on": 1 - (on - off) / 3900, "longest": on - off, "empty": 86400 / 3900, **never}
     assert uptime == pytest.approx(stored.metrics["uptime"]["astro"])
 
 
