@@ -15,6 +15,7 @@ from fleet2d.expectations import (
     after,
     always,
     at_most,
+    during,
     events,
     eventually,
     holds_for,
@@ -202,3 +203,32 @@ def test_at_most_counts_each_event_of_an_hour(times, holds):
     if not holds:
         first, last, worst, _ = verdict.violations[0]
         assert (first, last, worst) == (1, timedelta(hours=1).seconds - 1, -1.0)
+
+
+@pytest.mark.parametrize("condition", [during("00:00-24:00"), during("00:00-24:00") | moving("a")])
+def test_each_event_counts_by_itself_under_a_condition_too(condition):
+    """Those of neighbouring steps, and several at one step, counted once."""
+    steps = [10, 11, 11, 12, 600]
+    counts = trace_of([float(steps.count(step)) for step in range(1000)], 1000)
+    signals = {str(events("calls")): counts, str(moving("a")): trace_of([0.0] * 1000, 1000)}
+    known = RunSignals(signals, {}, 0, 1000, True, CLOCK)
+
+    assert [10, 11, 11, 12, 600] == (events("calls") & condition).occasions(known).tolist()
+    assert not verdict_of("", at_most(4, condition & events("calls")), known).holds
+    assert not verdict_of("", at_most(9, events("calls") | events("calls")), known).holds
+
+
+@pytest.mark.parametrize(
+    "expectation",
+    [
+        at_most(0, moving("a") & during("03:00-04:00")),
+        never(holds_for(moving("a") & during("03:00-04:00"), "1 min")),
+        never(moving("a") & during("00:00-00:01"), within=("2 min", "4 min")),
+    ],
+)
+def test_hours_that_the_run_never_reaches_leave_what_is_in_them_untested(expectation):
+    known = RunSignals({str(moving("a")): trace_of([1.0] * 1000, 1000)}, {}, 0, 1000, True, CLOCK)
+
+    verdict = verdict_of("", expectation, known)
+    assert verdict.holds is None
+    assert "never came" in verdict.untested

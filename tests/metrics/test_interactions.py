@@ -53,12 +53,15 @@ def test_bad_times_count_by_activity_and_annoy():
     numbers, run = measured(users={"ana": person})
     assert {} == numbers["interrupted"]  # at even odds of being available
 
-    days = [{"on": "daily", "items": [{"at": "07:02", "place": "kitchen", "activity": "read"}]}]
+    cooks = {"at": "07:00", "place": "kitchen", "activity": "cook"}
+    reads = {"at": "07:02", "place": "kitchen", "activity": "read"}
+    days = [{"on": "daily", "items": [cooks, reads]}]
     person = ana() | {"days": days, "answers": {"activity": {"base": -3}}}
     numbers, run = measured(users={"ana": person})
     rows = table(run, "interactions")
     noticed = int((rows["outcome"] != "").sum())
-    assert {"read": noticed} == numbers["interrupted"]
+    assert {"cook": 0, "read": noticed} == numbers["interrupted"]  # zeros, for means over runs
+    assert 0 == numbers["sent_away"]
     assert numbers["annoyance"] > 0.2
     assert rows["willingness"].max() < 0.1
 

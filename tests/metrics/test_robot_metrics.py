@@ -228,6 +228,28 @@ def test_a_search_at_the_end_of_the_run_is_censored():
     assert {"searches": 1, "success": 0.0, "mean": 600.0, "spl": 0.0, **mistakes} == result
 
 
+def test_a_search_ends_where_the_robot_goes_off():
+    """The next search took its place, and the last one counted until the end of the run."""
+    off = content("1 d")
+    off["users"]["ana"] = {"type": "schedule", "days": HIDDEN}
+    find = {"type": "find", "user": "ana", "every": "9 min", "policy": "random"}
+    off["robots"]["astro"] |= {"battery": None, "behaviors": [find, {"type": "patrol"}]}
+    off["simulation"]["duration"] = "26 min"
+    crash = {"power": "astro", "duration": "1 min"}
+    off["script"] = [{"at": "9 min 5 s", **crash}, {"at": "18 min 7 s", **crash}]
+    off["metrics"]["household"] = {}
+    stored = run(off)
+
+    rows = table(stored, "time_to_find")
+    begun = [step for step, name, _ in events(stored) if name == "find_begins"]
+    assert begun == rows["began"].tolist()
+    assert [540, 1080] == rows["began"][rows["end"] == "open"].tolist()
+    assert [5.0, 7.0] == rows["seconds"][rows["end"] == "open"].tolist()
+    assert len(begun) == stored.metrics["time_to_find"]["astro"]["searches"]
+    searching = stored.metrics["household"]["astro"]["searching_min"]
+    assert rows["seconds"].sum() / 60 == pytest.approx(searching)
+
+
 def test_a_wrong_verdict_not_at_home_is_counted():
     hidden = content("1 d")
     hidden["users"]["ana"] = {"type": "schedule", "days": HIDDEN}

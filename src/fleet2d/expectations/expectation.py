@@ -318,6 +318,8 @@ class Expectation(Term, ABC):
 
     is_call: ClassVar[bool] = True
     """Whether its text is a call, which needs no brackets."""
+    is_instant = False
+    """Whether it is about events, each of which counts by itself."""
 
     @property
     def unit(self) -> str:  # type: ignore[override]
@@ -407,6 +409,18 @@ class And(Expectation):
         parts = (part.robustness(run, high) for part in (self.one, self.other))
         return combine(type(self).choose, *parts)
 
+    @property
+    def is_instant(self) -> bool:  # type: ignore[override]
+        """Whether one of the parts is about events; of `Or`, whether both are."""
+        return self.one.is_instant or self.other.is_instant
+
+    def occasions(self, run: RunSignals) -> I64:
+        """Return the steps at which it begins to hold, or those of its events."""
+        if not self.is_instant:
+            return super().occasions(run)
+        steps = (self.one if self.one.is_instant else self.other).occasions(run)
+        return steps[self.robustness(run, False).values(steps) > 0]
+
     def untested(self, run: RunSignals) -> str:
         """Return why one of the parts was not tested; of `Or`, if none was."""
         reasons = [part.untested(run) for part in (self.one, self.other)]
@@ -422,6 +436,17 @@ class Or(And):
 
     word = "or"
     choose = np.maximum
+
+    @property
+    def is_instant(self) -> bool:  # type: ignore[override]
+        """Whether both parts are about events."""
+        return self.one.is_instant and self.other.is_instant
+
+    def occasions(self, run: RunSignals) -> I64:
+        """Return the steps at which it begins to hold, or those of all its events."""
+        if not self.is_instant:
+            return super().occasions(run)
+        return np.concatenate([part.occasions(run) for part in (self.one, self.other)])
 
 
 def bracketed(part: Expectation) -> str:

@@ -15,10 +15,9 @@ from fleet2d.errors import InputError
 from fleet2d.expectations.expectation import (
     INFINITE,
     WORDS,
-    And,
     Expectation,
-    Not,
     RunSignals,
+    Term,
     Trace,
     Word,
     combine,
@@ -139,8 +138,10 @@ class Invariant(Limited):
     def untested(self, run: RunSignals) -> str:
         """Return why there was nothing to expect: its hours, or its condition, never came."""
         texts = []
+        first = run.first + run.reach(self.within)[0]
         for premise in premises(self.operand):
-            if len(premise.robustness(run, False).until(self.last(run) + 1).spells):
+            came = premise.robustness(run, False).since(first).until(self.last(run) + 1)
+            if len(came.spells):
                 return ""
             texts.append(str(premise))
         return f"{' and '.join(texts)} never came" if texts else ""
@@ -317,15 +318,13 @@ class implies(Word, Expectation):
         return (~self.premise | self.part).robustness(run, high)
 
 
-def premises(operand: Expectation) -> list[Expectation]:
+def premises(operand: Term) -> list[Expectation]:
     """Return the conditions that must come true for an expectation of `operand` to be tested."""
     if isinstance(operand, implies):
         return [operand.premise]
     if isinstance(operand, during):
         return [operand]
-    parts = [operand.part] if isinstance(operand, Not) else []
-    parts += [operand.one, operand.other] if isinstance(operand, And) else []
-    return [premise for part in parts for premise in premises(part)]
+    return [premise for part in operand.parts() for premise in premises(part)]
 
 
 class after(Limited):

@@ -619,6 +619,8 @@ class events(Condition):
     entity: str | None = None
     detail: str | None = field(default=None, kw_only=True)
 
+    is_instant = True
+
     def check(self, scene: Scene) -> None:
         """Refuse an event that can never happen."""
         scene.check_event(self.kind, self.entity, self.detail, self)

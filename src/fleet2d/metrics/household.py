@@ -42,7 +42,13 @@ TERMS = {
 }
 """What is counted for each robot, and in which unit."""
 
-SEARCH_ENDS = frozenset({EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME})
+SEARCH_ENDS = frozenset(
+    {
+        EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME,
+        EventKind.FIND_BEGINS, EventKind.POWER_OFF,
+    }
+)  # fmt: skip
+"""What ends a search: its outcome, the next one, or going off."""
 
 
 def has_time(activity: str) -> bool:
@@ -201,16 +207,16 @@ def _search(
     """Follow a robot's searches up to the last step."""
     since = history.first  # the searching before is counted
     for event in events:
-        if event.event == EventKind.FIND_BEGINS:
-            track.searches = True
-            since = event.step
-        elif event.event in SEARCH_ENDS and track.searches:
+        if event.event in SEARCH_ENDS and track.searches:
             track.searches = False
             total["searching_min"] += event.step - since
             at = event.step - history.first
             named = [people[event.detail]] if event.detail in people else people.values()
             is_welcome = any(bool(person.may_be_found[at]) for person in named)
             total["finds"] += event.event == EventKind.FOUND and is_welcome
+        if event.event == EventKind.FIND_BEGINS:
+            track.searches = True
+            since = event.step
     if track.searches:
         total["searching_min"] += history.end - since
 

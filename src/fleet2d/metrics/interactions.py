@@ -3,6 +3,7 @@
 import copy
 from bisect import bisect_right
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
@@ -40,10 +41,10 @@ class Interactions(Metric):
     - `value`: value of what was accepted, without what the robot broke off as it went off;
       `missed`: the worth of all requests minus that;
     - `wait_s`: mean time to an answer; `woke`: times that it woke the person;
-    - `interrupted`: how often each activity was interrupted at a bad time: the probability of being
-      available was below a half;
+    - `interrupted`: how often each of the person's activities was interrupted at a bad time: the
+      probability of being available was below a half;
     - `called`, `question`, `replies`, `sent_away`, `banned`, `switched_off`, `given_up`,
-      `broken_off`: how often each of them happened, if ever, whoever began;
+      `broken_off`: how often each of them happened, whoever began;
     - `annoyance`, `trust`: at the end, and `mean_annoyance`, over the times of being addressed.
 
     Its table has a row for each time that a person was addressed, with the truth of it.
@@ -71,6 +72,7 @@ class Interactions(Metric):
         self.worth: Counter[tuple[str, str]] = Counter()
         self.records: dict[tuple[str, str], list[AnswerRecord]] = {}
         self.told: dict[tuple[str, str], Counter[str]] = {}
+        self.activities: dict[str, Counter[str]] = {}  # how often each user began each of them
 
     def update(self, history: History, state: Present) -> Any:
         """Take in what happened; return a row for each time that a person was addressed."""
@@ -79,6 +81,8 @@ class Interactions(Metric):
             self.wanted[key] += 1
             self.worth[key] += wanted.interaction.worth  # type: ignore[assignment]
         for event in history.events:
+            if event.event == EventKind.ACTIVITY:
+                self.activities.setdefault(event.entity, Counter())[event.detail] += 1
             if event.event in TOLD:
                 people = (word for word in reversed(event.detail.split()) if word in state.users)
                 if (person := next(people, None)) is not None:
@@ -111,9 +115,26 @@ class Interactions(Metric):
             if count:
                 records = self.records.get((robot, user), [])
                 numbers = _summary(records, count, float(self.worth[robot, user]))
-            told = sorted(self.told.get((robot, user), {}).items())
-            result.setdefault(robot, {})[user] = {"wanted": count, **numbers, **dict(told)}
+                interrupted = dict.fromkeys(self.activities.get(user, ()), 0) | _bad_times(records)
+                numbers["interrupted"] = dict(sorted(interrupted.items()))
+            told: dict[str, int] = dict.fromkeys(sorted(TOLD), 0)
+            told |= self.told.get((robot, user), {})
+            result.setdefault(robot, {})[user] = {"wanted": count, **numbers, **told}
         return result
+
+    @classmethod
+    def summary(cls, result: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return all but hidden numbers, and of what happens without a request what did."""
+        return super().summary(_without_what_never_happened(result))
+
+
+def _without_what_never_happened(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a result without the zeros of `TOLD`, however deep they are."""
+    return {
+        name: _without_what_never_happened(value) if isinstance(value, Mapping) else value
+        for name, value in result.items()
+        if value or name not in TOLD
+    }
 
 
 def _person(text: str) -> str:
@@ -134,11 +155,9 @@ def _summary(records: list[AnswerRecord], wanted: int, worth: float) -> dict[str
     }
     if not records:
         return numbers
-    bad = Counter(r.activity or "unknown" for r in records if r.outcome and r.willingness < 0.5)
     numbers |= {
         "answered": len(answered) / len(records),
         "accepted": len(accepted) / len(records),
-        "interrupted": dict(sorted(bad.items())),
         "annoyance": records[-1].annoyance,
         "mean_annoyance": sum_in_order(r.annoyance for r in records) / len(records),
         "trust": records[-1].trust,
@@ -146,6 +165,11 @@ def _summary(records: list[AnswerRecord], wanted: int, worth: float) -> dict[str
     if answered:
         numbers["wait_s"] = sum_in_order(r.delay_s for r in answered) / len(answered)
     return numbers
+
+
+def _bad_times(records: list[AnswerRecord]) -> dict[str, int]:
+    """Return how often each activity was interrupted at a bad time, if ever."""
+    return Counter(r.activity or "unknown" for r in records if r.outcome and r.willingness < 0.5)
 
 
 REGRET_COLUMNS = ("robot", "request", "due_at", "best_at", "best_chance", "best", "value")

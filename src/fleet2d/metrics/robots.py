@@ -28,6 +28,8 @@ from fleet2d.runtime.events import Event, EventKind
 from fleet2d.sight.camera import DEFAULT_RANGE_M
 
 ENDS = (EventKind.FOUND, EventKind.NOT_AT_HOME, EventKind.GAVE_UP)
+BREAKS = (EventKind.FIND_BEGINS, EventKind.POWER_OFF)
+"""What ends a search without an outcome: the next one, or going off."""
 
 
 class ReachTime(Metric):
@@ -117,7 +119,8 @@ class SearchRecord(NamedTuple):
         began: Step at which it began.
         seconds: Duration [s].
         end: Outcome: one of ENDS, `false` where the robot mistook another person for the user, or
-            `open` during the search, or where the run ended first.
+            `open` during the search, or where it was broken off: by the next one, by going off, or
+            by the end of the run.
         at_home: Whether the user was at home when it began.
         metres: During the search, the robot's total distance driven when it began; after it, the
             distance driven during the search [m].
@@ -200,10 +203,10 @@ class TimeToFind(Metric):
                 if event.entity != robot:
                     continue
                 metres = float(driven[event.step - history.first])
+                if event.event in (*ENDS, *BREAKS) and robot in self.open:
+                    ended.append(self._end(history, event, metres))
                 if event.event == EventKind.FIND_BEGINS and event.detail in state.users:
                     self.open[robot] = self._begin(history, state, event, metres)
-                elif event.event in ENDS and robot in self.open:
-                    ended.append(self._end(history, event, metres))
             self.driven[robot] = float(driven[-1])
         for search in ended:
             self.done.setdefault(search.robot, []).append(search)
@@ -232,7 +235,7 @@ class TimeToFind(Metric):
 
     def _end(self, history: History, event: Event, metres: float) -> SearchRecord:
         search = self.open.pop(event.entity)
-        end = event.event
+        end = event.event if event.event in ENDS else search.end
         i = event.step - history.first
         user = history.poses(search.user)
         gap = np.array(history.poses(event.entity).at(i)) - user.at(i)
@@ -348,7 +351,7 @@ class Blocking(Metric):
             moves = (np.diff(xy, axis=0, prepend=[start]) != 0).any(axis=1) & pair.at_home
             is_blocked = moves & (is_near | np.append(was_near, is_near[:-1]))
             begins = is_blocked & ~np.append(was_blocked, is_blocked[:-1])
-            counts = self.counts.setdefault(key, {"blocks": 0, "seconds": 0.0})
+            counts = self.counts.setdefault(key, {"blocks": 0, "seconds": 0.0, "asides": 0})
             counts["blocks"] += int(np.count_nonzero(begins))
             counts["seconds"] += int(np.count_nonzero(is_blocked)) * history.step_s
             self.last[key] = pair.user_poses.at(-1), bool(is_near[-1]), bool(is_blocked[-1])
@@ -357,11 +360,11 @@ class Blocking(Metric):
             if event.event == EventKind.REACTS and event.detail in steps_aside:
                 met = self.counts.get((steps_aside[event.detail], event.entity))
                 if met is not None:  # else a robot stepped aside, by a behavior of its own
-                    met["asides"] = met.get("asides", 0) + 1
+                    met["asides"] += 1
         self.days += history.days
 
     def result(self) -> dict[str, Any]:
-        """Return {robot: {user: {blocks, seconds}}}, with asides if there were any, per day."""
+        """Return {robot: {user: {blocks, seconds, asides}}}, per day."""
         rates = {}
         for pair, counts in self.counts.items():
             rates[pair] = {name: value / self.days for name, value in counts.items()}

@@ -65,7 +65,7 @@ class Detections(Metric):
     - `recognized`: observations with the correct user / observations of users; an observation of
       nobody known counts as not recognized.
     - `confusion`: for each user, and for nobody (false positives), the shares of observations
-      recognized as each user, or as nobody (`unknown`); each sums to one.
+      recognized as each user, or as nobody (`unknown`), zeros too; each sums to one.
 
     A ratio whose denominator is 0 is left out. Observations of a real robot, whose truth nobody
     knows, count in none of them: `unknown_truth` is their number. Stored per period: looks,
@@ -144,7 +144,7 @@ class Detections(Metric):
         for true, row in zip((*users, NO_ONE), counts.tolist(), strict=True):
             perceived = zip((*users, UNKNOWN), row, strict=True)
             if any(row):
-                confusion[true] = {name: count / sum(row) for name, count in perceived if count}
+                confusion[true] = {name: count / sum(row) for name, count in perceived}
         if confusion:
             numbers["confusion"] = confusion
         if self.unknown[robot]:
