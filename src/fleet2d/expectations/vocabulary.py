@@ -189,19 +189,19 @@ def outline(mask: Bool, side: int) -> I64:
         side: The side of a cell [lattice].
     """
     padded = np.pad(mask, 1)
-    horizontal = [(x0, y, x1, y) for y, x0, x1 in _borders(padded[1:] != padded[:-1])]
-    vertical = [(x, y0, x, y1) for x, y0, y1 in _borders((padded[:, 1:] != padded[:, :-1]).T)]
+    horizontal = [(x0, y, x1, y) for y, x0, x1 in _borders(padded)]
+    vertical = [(x, y0, x, y1) for x, y0, y1 in _borders(padded.T)]
     edges = np.array(horizontal + vertical, np.int64).reshape(-1, 4)
     return edges * side
 
 
-def _borders(differ: Bool) -> list[tuple[int, int, int]]:
-    """Return the runs of true values of each row: row, first column, one past the last column."""
-    padded = np.pad(differ, ((0, 0), (1, 1)))
-    row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
+def _borders(cells: Bool) -> list[list[int]]:
+    """Return the borders after rows of padded cells: row, first column, one past the last."""
+    differ = np.pad(cells[1:] != cells[:-1], ((0, 0), (1, 1)))
+    row, column = np.nonzero(differ[:, 1:] != differ[:, :-1])
     # Columns are shifted by 1, as the cells themselves were padded.
-    pairs = zip(row[::2].tolist(), column[::2].tolist(), column[1::2].tolist(), strict=True)
-    return [(r, a - 1, b - 1) for r, a, b in pairs]
+    ends = column.reshape(-1, 2) - 1
+    return np.column_stack([row[::2], ends]).tolist()
 
 
 class _Motion(Measurement):

@@ -130,8 +130,7 @@ class RoomView:
         whole = np.ascontiguousarray(whole[self.window])
         doors = doors[self.window]
         # Doors beyond the window don't count, and neither does its edge.
-        apart = np.ones((doors.shape[0] + 2, doors.shape[1] + 2), np.bool_)
-        apart[1:-1, 1:-1] = ~doors
+        apart = np.pad(~doors, 1, constant_values=True)
         self._floor = RoomFloor(
             holds=whole & self.inside & ~doors,
             whole=whole,

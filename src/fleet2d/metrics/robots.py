@@ -239,7 +239,8 @@ class TimeToFind(Metric):
         i = event.step - history.first
         user = history.poses(search.user)
         gap = np.array(history.poses(event.entity).at(i)) - user.at(i)
-        if end == EventKind.FOUND and (user.away[i] or float((gap * gap).sum()) > self.sight**2):
+        is_too_far = float((gap * gap).sum()) > self.sight**2
+        if end == EventKind.FOUND and (user.away[i] or is_too_far):
             end = "false"
         seconds = (event.step - search.began) * history.step_s
         return search._replace(metres=metres - search.metres, seconds=seconds, end=end)

@@ -169,7 +169,9 @@ def split(places: list[F64], users: int, unknown: Bool | None) -> tuple[F64, F64
         unknown: bool (bins, rooms), where an unknown person was perceived; None: nowhere.
     """
     rows = with_anyone(places, unknown) if users else places[0][:, np.newaxis]
-    return normalized(np.maximum(rows[..., :-1], 0)), np.clip(rows[..., -1], 0, 1)
+    home = normalized(np.maximum(rows[..., :-1], 0))
+    away = np.clip(rows[..., -1], 0, 1)
+    return home, away
 
 
 class Follower:

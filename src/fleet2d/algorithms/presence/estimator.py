@@ -274,7 +274,8 @@ class Estimator(Component):
             return np.zeros(shape), np.ones(shape)
         sums = resampled(key, days.reshape(len(days), -1), REPLICATES)
         home, away = self.shares(sums.reshape(REPLICATES, *self.counts.shape))
-        values = np.sort(np.concatenate([home, away[..., None]], axis=-1), axis=0, kind="stable")
+        places = np.concatenate([home, away[..., None]], axis=-1)
+        values = np.sort(places, axis=0, kind="stable")
         cut = min(int((1 - level) / 2 * REPLICATES), (REPLICATES - 1) // 2)
         return values[cut], values[REPLICATES - 1 - cut]
 

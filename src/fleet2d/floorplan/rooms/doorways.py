@@ -214,10 +214,15 @@ def _jamb(corners: F64, ring_of: I64, start: F64, end: F64, far: F64) -> tuple[i
     ends = corners[1:]
     least = np.minimum(start, far)
     most = np.maximum(start, far)
-    is_near = ((np.minimum(begins, ends) <= most) & (np.maximum(begins, ends) >= least)).all(axis=1)
+    low = np.minimum(begins, ends)
+    high = np.maximum(begins, ends)
+    is_near = ((low <= most) & (high >= least)).all(axis=1)
     is_near &= ring_of[:-1] == ring_of[1:]
     hits = _crossings(begins[is_near], ends[is_near], start, far)
-    nearest = hits[np.argmin(((hits - start) ** 2).sum(axis=1))] if len(hits) else end
+    nearest = end
+    if len(hits):
+        squared = ((hits - start) ** 2).sum(axis=1)
+        nearest = hits[squared.argmin()]
     away = np.maximum(*np.abs(corners - nearest).T)
     if away.min() <= CORNER_DISTANCE:
         x, y = corners[np.argmin(away)].tolist()

@@ -93,7 +93,8 @@ def without_frame(walls: Bool) -> Bool | None:
     part = label_parts(np.ascontiguousarray(box), True)
     frame = part == part[0].max()  # of the first row
     high, wide = (max(round(FRAME_SHARE * side), 1) for side in box.shape)
-    is_around = all(side.any() for side in (frame[0], frame[-1], frame[:, 0], frame[:, -1]))
+    sides = (frame[0], frame[-1], frame[:, 0], frame[:, -1])
+    is_around = all(side.any() for side in sides)
     if not is_around or frame[high:-high, wide:-wide].any() or frame[box].all():
         return None
     inner = walls.copy()

@@ -650,7 +650,8 @@ def _note_entities(content: dict[str, Any], notes: list[str]) -> None:
     pieces = [read_points(entity, where) for entity, where in entities_of(content, "path")]
     points = sum(len(piece) for piece in pieces)
     if points:
-        metres = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in pieces)
+        steps = [np.linalg.norm(np.diff(piece, axis=0), axis=1) for piece in pieces]
+        metres = sum(float(lengths.sum()) for lengths in steps)
         notes.append(
             f"the vacuum's recorded path is {metres:.1f} m long, {points} points, in pieces:"
             f" {len(pieces)}; it is not part of the plan"
