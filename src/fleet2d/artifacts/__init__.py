@@ -1,1 +1,1 @@
-"""What a run stores: tables, digests, manifest, run directory."""
+"""Stored runs: tables, digests, manifest, run directory."""

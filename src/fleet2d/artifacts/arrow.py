@@ -1,4 +1,4 @@
-"""Between chunks and Arrow: schemas, tables, Parquet files."""
+"""Conversion between chunks and Arrow: schemas, tables, Parquet files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from fleet2d.kernels import Bool
 from fleet2d.storage import files
 from fleet2d.storage.files import PARTIAL
 
-# Bytes of text in one array: Arrow counts them by 32 bits.
+# Arrow counts the bytes of text in an array in 32 bits.
 MAX_TEXT_BYTES = 2**31 - 1
 
 _TYPES = {
@@ -121,7 +121,7 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
             raise ArtifactError(
                 f"{column.name} is more than 2 GiB of text at once: append fewer rows at a time"
             )
-        # A cast of large strings would do, but it imports pyarrow.compute: a tenth of a second.
+        # Casting large strings would be simpler, but imports pyarrow.compute: a tenth of a second.
         offsets = pa.py_buffer(ends.astype(np.int32))
         text = pa.py_buffer(np.ascontiguousarray(chunk.values))
         bitmap = None if missing is None else _bits(~missing)
@@ -135,7 +135,7 @@ def _array_of(chunk: ColumnChunk, column: Column, dictionary: pa.Array | None) -
 def number_array(values: NDArray[Any], kind: pa.DataType, missing: Bool | None = None) -> pa.Array:
     """Wrap numbers or booleans as they lie in memory.
 
-    `pa.array` would do, but it imports pandas where that is installed: a quarter of a second.
+    `pa.array` would be simpler, but imports pandas if installed: a quarter of a second.
     """
     data = _bits(values) if kind == pa.bool_() else pa.py_buffer(np.ascontiguousarray(values))
     bitmap = None if missing is None else _bits(~missing)
@@ -170,7 +170,7 @@ def chunks_of(table: pa.Table, spec: TableSpec, words: Words) -> Iterator[tuple[
 
 
 def _chunk_of(array: pa.Array, column: Column, words: Words) -> ColumnChunk:
-    """Convert an Arrow array to the form that is hashed: nulls are zero."""
+    """Convert an Arrow array to the form that is hashed, with zeros for nulls."""
     if not len(array):
         return empty_chunk(column)
     valid = array.is_valid().to_numpy(zero_copy_only=False) if column.nullable else None
@@ -192,7 +192,7 @@ def _chunk_of(array: pa.Array, column: Column, words: Words) -> ColumnChunk:
 
 
 def _codes_of(array: pa.Array, column: Column, words: Words) -> Any:
-    """Return the codes of an array in the dictionary of the column, whatever the array's own is."""
+    """Return the codes of an array, converted from its own dictionary to that of the column."""
     if not pa.types.is_dictionary(array.type):
         array = array.dictionary_encode()
     names = array.dictionary.to_pylist()
@@ -213,8 +213,8 @@ def _codes_of(array: pa.Array, column: Column, words: Words) -> Any:
 def values_of(column: pa.ChunkedArray) -> NDArray[Any]:
     """Return the values of a stored column without nulls: numbers, times, flags, or names.
 
-    Times are int64, in microseconds; names are objects. `to_numpy` would do, but it imports pandas
-    where that is installed: a quarter of a second.
+    Times are int64, in microseconds; names are objects. `to_numpy` would be simpler, but imports
+    pandas if installed: a quarter of a second.
 
     Raises:
         ValueError: A value is missing.
@@ -356,7 +356,7 @@ def count_rows(path: Path) -> int:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
-    """Open a file, and say which one it is if it can't be opened or read."""
+    """Open a file; errors in opening or reading it name the file."""
     try:
         with pq.ParquetFile(path) as file:
             yield file
@@ -381,7 +381,7 @@ def with_categories(table: pa.Table) -> pa.Table:
     for i, column in enumerate(spec_of(table.schema).columns):
         if column.kind != "category":
             continue
-        # The dictionary of the first chunk comes first in the unified one.
+        # The unified dictionary begins with that of the first chunk.
         no_codes = number_array(np.empty(0, np.int32), pa.int32(), None)
         first = pa.DictionaryArray.from_arrays(no_codes, string_array(column.categories))
         unified = pa.chunked_array([first, *table.column(i).chunks]).unify_dictionaries()

@@ -1,4 +1,4 @@
-"""The manifest of a run: what was run, with what, and what came out; strict JSON, as a model."""
+"""The manifest of a run: scenario, versions, inputs and results, as a model of strict JSON."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def plain(value: Any) -> Any:
 
 
 def canonical(content: Mapping[str, Any]) -> str:
-    """Return the one text that a manifest of some content has: its keys are sorted.
+    """Return the canonical text of a manifest's content, with sorted keys.
 
-    Only the keys within sections of the scenario stay in their order, which has an effect: users,
-    for example, decide in the order in which they are listed.
+    Only the keys within sections of the scenario keep their order, since it matters: users, for
+    example, decide in the order in which they are listed.
     """
     ordered = _sorted({key: value for key, value in content.items() if key != "scenario"})
     if "scenario" in content:
@@ -129,7 +129,7 @@ def _version(package: str) -> str:
         return "unknown"
 
 
-# The farthest that a camera sees [m]: far beyond any home.
+# The longest range of a camera, far beyond any home [m].
 _FARTHEST_M = 1000.0
 
 
@@ -150,7 +150,7 @@ _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class _StoredPart(BaseModel):
-    """A part with some keys checked and the others left as they are."""
+    """A part of which some keys are checked; others are left as they are."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False, defer_build=True)
 
@@ -198,7 +198,7 @@ class _StoredIntervention(_StoredPart):
 class _StoredVerdict(_StoredPart):
     expectation: str
     first: Count
-    holds: bool | None = True  # None: it was never put to the test
+    holds: bool | None = True  # None: the expectation was never tested
     decided: bool = True
 
 
@@ -227,7 +227,7 @@ def start_of(manifest: Mapping[str, Any]) -> dt.datetime:
 
 
 def time_problem(manifest: Mapping[str, Any]) -> str:
-    """Return why the steps of a run have no times; empty if they have.
+    """Explain why the steps of a run have no times; empty if they have.
 
     Example:
         >>> start = "9999-12-31T00:00:00"
@@ -268,9 +268,9 @@ def learned_files(root: Path) -> set[str]:
 
 """The folder in a run directory of what algorithms have learned."""
 
-# Problems of one manifest that a message lists, at most.
+# A message lists at most this many problems of a manifest.
 _MAX_PROBLEMS = 5
-# Characters of a wrong value that a message quotes, at most.
+# A message quotes at most this many characters of a wrong value.
 _MAX_CHARACTERS = 60
 
 SLOW = "simulation.speedup is"
@@ -291,7 +291,7 @@ def _check_time(text: str) -> str:
 
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-# The name of a table is that of its file: it must not lead out of the directory.
+# The name of a table is that of its file, and must not lead out of the directory.
 TableName = Annotated[str, Field(pattern=r"^\w[\w.\-]*$")]
 FileName = Annotated[str, Field(pattern=r"^(learned/)?\w[\w.\-]*$")]
 
@@ -423,7 +423,7 @@ class Manifest(BaseModel):
         known = {record.path for record in self.inputs}
         new_paths = sorted({path for path in paths if str(path) not in known})
         for path in new_paths:
-            with suppress(OSError):  # its code ran anyway
+            with suppress(OSError):  # a file of code may be gone after it ran
                 self.inputs.append(input_record(path))
         return bool(new_paths)
 
@@ -461,7 +461,8 @@ class Manifest(BaseModel):
         """Read the manifest of a run directory.
 
         Raises:
-            RunDirectoryError: There is none, or it is not valid; the message says what is wrong.
+            RunDirectoryError: There is no manifest, or it is not valid; the message lists its
+                problems.
         """
         path = path_in(directory, FILE_NAME)
         try:
@@ -484,7 +485,7 @@ class Manifest(BaseModel):
             content: Plain JSON data.
 
         Raises:
-            RunDirectoryError: It is not valid; the message says what is wrong.
+            RunDirectoryError: The content is not valid; the message lists its problems.
         """
         if not isinstance(content, dict) or type(content.get("format")) is not int:
             raise _damaged(path, "it has no key 'format'")
@@ -500,7 +501,7 @@ class Manifest(BaseModel):
             ManifestParts.model_validate(content)
         except ValidationError as error:
             raise _damaged(path, problems_of(error)) from None
-        # Tables that no simulation stored have no scenario, and no times.
+        # Tables that no simulation wrote have no scenario, and no times.
         reason = time_problem(content)
         if manifest.scenario and reason:
             raise _damaged(path, reason)
@@ -511,7 +512,7 @@ def json_of(path: Path, text: bytes) -> Any:
     """Return the text of a manifest as plain JSON data.
 
     Raises:
-        RunDirectoryError: It is not JSON.
+        RunDirectoryError: The text is not JSON.
     """
     try:
         return read_json(text)
@@ -520,7 +521,7 @@ def json_of(path: Path, text: bytes) -> Any:
 
 
 def problems_of(error: ValidationError) -> str:
-    """Return a message that names the wrong fields and what is wrong with each."""
+    """Return a message with the wrong fields and the problem of each."""
     lines = []
     for line in error.errors(include_url=False)[:_MAX_PROBLEMS]:
         key = printable(".".join(map(str, line["loc"])))

@@ -51,7 +51,7 @@ class TableDigest:
         """Return the digest of all rows so far.
 
         Args:
-            words: The dictionaries of the columns whose dictionary grows.
+            words: The dictionaries of columns with a growing dictionary.
         """
         columns = []
         for column in self.spec.columns:
@@ -82,7 +82,7 @@ def digest_table(table: pa.Table, spec: TableSpec | None = None) -> str:
 
     Args:
         table: A table as read back from a run.
-        spec: What the table should be; None: what its schema says.
+        spec: The expected columns; None: those of its schema.
 
     Raises:
         ArtifactError: The table's columns are not those of the spec.
@@ -105,7 +105,7 @@ def _digest_parts(parts: Iterable[pa.Table], spec: TableSpec) -> tuple[int, str]
 
 
 def record_of_file(path: Path) -> TableRecord:
-    """Return what a manifest says of a stored table, from its file.
+    """Return the manifest's record of a stored table, from its file.
 
     Raises:
         ArtifactError: The file can't be read.

@@ -116,7 +116,7 @@ class TableWriter:
     logged: int = 0
 
     def hashed(self) -> TableDigest:
-        """Return the digest of the rows that left the buffer; those in memory are hashed now."""
+        """Hash the rows kept in memory; return the digest of all rows that left the buffer."""
         if self.digest is not None:
             return self.digest
         digest = TableDigest(self.buffer.spec)
@@ -125,7 +125,7 @@ class TableWriter:
         return digest
 
     def log(self, unfinished: UnfinishedRun | None) -> None:
-        """Append the rows of the buffer to the journal that are not in it yet.
+        """Append those rows of the buffer to the journal that it doesn't have yet.
 
         Raises:
             OSError: They can't be written.
@@ -176,7 +176,7 @@ class RunStore:
         *,
         flush_rows: int = FLUSH_ROWS,
     ) -> None:
-        """Write nothing yet: `open` does."""
+        """Prepare the store; `open` writes the first files."""
         self.directory = None if directory is None else Path(directory)
         self.manifest = Manifest()
         self.root = None if self.directory is None else self.directory.absolute()
@@ -192,14 +192,14 @@ class RunStore:
             self.add_table(spec)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the functions that listen: they belong to the caller, not to the run."""
+        """Leave out the row listeners, which belong to the caller, not to the run."""
         return {**self.__dict__, "row_listeners": []}
 
     def check(self) -> None:
         """Check, without writing, that the directory can be used.
 
         Raises:
-            RunDirectoryError: It exists and isn't empty, is a file, or can't be written.
+            RunDirectoryError: The directory isn't empty, is a file, or can't be written.
         """
         directory = self.directory
         if directory is None:
@@ -255,7 +255,7 @@ class RunStore:
         except OSError as error:
             self.discard()
             raise cannot_write(self.directory, error) from error
-        except RunDirectoryError:  # a run that nobody could open
+        except RunDirectoryError:  # without a manifest, nobody could open the run
             self.discard()
             raise
 
@@ -354,7 +354,7 @@ class RunStore:
         return tuple(self._tables)
 
     def add_rows(self, table: str, columns: Columns, description: str = "") -> None:
-        """Add rows to a table that is declared by them; see `append`.
+        """Declare a table by its columns if needed, and add rows to it; see `append`.
 
         Args:
             table: The name of the table.
@@ -470,7 +470,7 @@ class RunStore:
         return digests
 
     def discard(self) -> None:
-        """Remove all that was written, for a run that failed before its first step."""
+        """Remove all written files of a run that failed before its first step."""
         for entry in self._tables.values():
             if entry.file is not None:
                 entry.file.abandon()
@@ -481,7 +481,7 @@ class RunStore:
                 for path in (self.root / name, self.root / f"{name}{PARTIAL}"):
                     with suppress(OSError):
                         path.unlink()
-        for path in self._new_directories:  # if they are empty, the innermost first
+        for path in self._new_directories:  # innermost first; only empty ones can be removed
             with suppress(OSError):
                 path.rmdir()
         self._is_open = False
@@ -553,7 +553,7 @@ class RunStore:
         self.manifest.notes.append(reason)
         if _try_write(self.manifest, self.root):
             return True
-        # The file is lost anyway; its space is enough for a manifest on a full disk.
+        # The file is lost anyway, and frees enough space for a manifest on a full disk.
         file = None if entry is None else entry.file
         return file is not None and file.empty() and _try_write(self.manifest, self.root)
 

@@ -1,4 +1,4 @@
-"""Tables of a run: their columns, the one form of rows that is hashed and stored, and a buffer."""
+"""Tables of a run: their columns, the form of rows that is hashed and stored, and a buffer."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Column:
         name: Its name, with the unit in it where the unit isn't SI.
         kind: `step` int64 · `time` timestamp[us] · `int32` · `int64` · `float64` · `bool` ·
             `category` dictionary<int32, string> · `string`.
-        unit: Its unit, such as "m" or "rad"; empty where there is none. Of times, which are UTC
-            then, the time zone.
+        unit: Its unit, such as "m" or "rad"; empty without one. For UTC times, the time zone of the
+            home.
         nullable: Whether a value may be missing. Missing values are NaN in float64, NaT in time,
             code -1 or None in category, None in string, and what a masked array masks.
         categories: The words that the codes of a category column stand for. Empty: the column
@@ -92,7 +92,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Repeated:
-    """The values of a column of which most come several times: each is stored and checked once.
+    """The values of a column with many repetitions: each distinct value is stored and checked once.
 
     Example:
         >>> np.asarray(Repeated(np.array([0.5, 2.0]), np.array([0, 0, 1]))).tolist()
@@ -100,7 +100,7 @@ class Repeated:
 
     Attributes:
         values: Numbers or codes, (k,).
-        index: int64 (rows,), the place among them of the value of each row.
+        index: int64 (rows,), the index into `values` of each row.
     """
 
     values: NDArray[Any]
@@ -111,7 +111,7 @@ class Repeated:
         return self.values[self.index].astype(dtype or self.values.dtype, copy=False)
 
     def copy_to(self, rows: NDArray[Any], start: int) -> None:
-        """Copy the values from row `start` on, as many as there are rows."""
+        """Copy the values from row `start` on into `rows`, as many as fit."""
         index = self.index[start : start + len(rows)]
         np.take(self.values, index, out=rows, mode="clip")  # other modes make a copy first
 
@@ -127,7 +127,7 @@ TIME = Column("time", "time", description="local time")
 
 
 def time_column(zone: Zone | None) -> Column:
-    """Return the column of times of a run: of UTC, with the time zone of the home if it has one."""
+    """Return the time column of a run: UTC if the home has a time zone."""
     return TIME if zone is None else replace(TIME, unit=zone.label, description="time")
 
 
@@ -258,7 +258,7 @@ _ACCEPTED = {"float64": "fiu", "bool": "b", "time": "iuM"}
 
 
 class Batch(NamedTuple):
-    """Rows that fit the table, before they are copied into it.
+    """Converted rows, before they are copied into a buffer.
 
     Attributes:
         rows: Number of rows.
@@ -302,7 +302,7 @@ class TableBuffer:
         return self.rows >= self.limit
 
     def check(self, columns: Mapping[str, Any]) -> Batch:
-        """Convert columns to the table's types; the buffer is not changed yet.
+        """Convert columns to the table's types, without changing the buffer.
 
         Args:
             columns: One array, or `Repeated`, per column, all of one length; a scalar stands for
@@ -342,7 +342,7 @@ class TableBuffer:
         known = [(words, len(words)) for words in self.words.values()]
         try:
             self._copy(batch, start, stop)
-        except BaseException:  # such as Ctrl-C: the digest counts no word that is in no row
+        except BaseException:  # also Ctrl-C: the dictionary must have no word that is in no row
             for words, count in known:
                 while len(words) > count:
                     words.popitem()
@@ -351,7 +351,7 @@ class TableBuffer:
         return stop
 
     def _copy(self, batch: Batch, start: int, stop: int) -> None:
-        """Copy some rows of a batch behind those of the buffer, which doesn't count them yet."""
+        """Copy some rows of a batch after those of the buffer, without counting them yet."""
         a = self.rows
         b = a + stop - start
         for column in self.spec.columns:
@@ -391,7 +391,7 @@ class TableBuffer:
         chunk = {column.name: read(column) for column in self.spec.columns}
         self.rows = 0
         if not reuse:
-            # The next rows are likely to be as many.
+            # The next chunk is likely to have as many rows.
             self._first_capacity = max(self._first_capacity, self._capacity)
             self._capacity = 0
             self._values = {}
@@ -401,7 +401,7 @@ class TableBuffer:
         return chunk
 
     def arrays(self, start: int) -> list[NDArray[Any]]:
-        """Return the rows from `start` on, at least one, as the journal takes them.
+        """Return the rows from `start` on, at least one, in the form of the journal.
 
         Returns:
             Of each column which values are not missing, if it is nullable, and its values; of texts
@@ -414,7 +414,7 @@ class TableBuffer:
         return arrays
 
     def _rows_of(self, column: Column, start: int) -> ColumnChunk:
-        """Return what one column holds from row `start` on."""
+        """Return the values of one column from row `start` on."""
         name = column.name
         rows = slice(start, self.rows)
         if column.kind == "string":
@@ -461,7 +461,7 @@ def _convert(column: Column, values: Any) -> tuple[Any, Any]:
     if column.takes_strings:
         return _as_strings(column, values), True
     valid = None
-    # There is no masked array before `numpy.ma` is imported, which takes time.
+    # Importing `numpy.ma` takes time, and without it there are no masked arrays.
     if "numpy.ma" in sys.modules and isinstance(values, np.ma.MaskedArray):
         valid = ~np.ma.getmaskarray(values)
         values = np.ma.getdata(values)
@@ -489,7 +489,7 @@ def _convert(column: Column, values: Any) -> tuple[Any, Any]:
 
 
 def _convert_repeated(column: Column, values: Repeated) -> tuple[Repeated, Any]:
-    """Do the same with values of which each is given once."""
+    """Convert values of which each is given once; see `_convert`."""
     once, valid = _convert(column, values.values)
     once = once.astype(DTYPES[column.kind])
     if not column.nullable:
@@ -522,7 +522,7 @@ def _check_integers(column: Column, values: Any, unmasked: Any) -> Any:
 def _as_strings(column: Column, strings: Any) -> Any:
     """Return one string (or None), or a list of them."""
     if isinstance(strings, np.ndarray):
-        strings = strings.tolist()  # a scalar if it has no dimension
+        strings = strings.tolist()  # an array without dimensions becomes a scalar
     if strings is not None and not isinstance(strings, str):
         strings = list(strings)
     given = strings if isinstance(strings, list) else [strings]

@@ -56,10 +56,10 @@ JOURNAL = JournalFormat(
     f"fleet2d journal 4 {sys.byteorder}\n".encode(), ("table", "rows", "commit")
 )
 
-# How often the journal is flushed to the disk [s]: so much is lost in a power cut, at most. A crash
-# of the process loses none of it.
+# Interval of flushing the journal to the disk [s]: a power cut loses no more, and a crash of the
+# process nothing.
 SYNC_S = 5.0
-# Rows in one frame at most: a few damaged bytes must not request all memory.
+# A frame has at most this many rows, as a few damaged bytes must not request all memory.
 _MAX_ROWS = 1 << 20
 # The years 1 to 9999 [us since 1970], which `datetime` can express.
 _FIRST_TIME = -62_135_596_800_000_000
@@ -159,7 +159,7 @@ def read_rows(path: Path, end: int) -> Iterator[LoggedRows]:
 
 @contextmanager
 def _damage_of(path: Path) -> Iterator[None]:
-    """Name the file if a frame with a right checksum has a wrong content."""
+    """Raise an error that names the file if a frame has a right checksum and wrong content."""
     try:
         yield
     except (AttributeError, KeyError, IndexError, OSError, TypeError, ValueError) as error:
@@ -302,7 +302,7 @@ def _repeat(content: bytes, dtype: np.dtype[Any], runs: int, rows: int) -> NDArr
     middle = runs * dtype.itemsize
     width = (len(content) - middle) // max(1, runs)
     lengths = np.frombuffer(content[middle:], _narrow(width))
-    # Before anything is repeated: a few bytes must not request all memory.
+    # Lengths are checked before repeating: a few bytes must not request all memory.
     if len(lengths) != runs or int(lengths.sum(dtype=np.int64)) != rows:
         raise ValueError(f"{runs} runs don't make {rows} values")
     return np.repeat(np.frombuffer(content[:middle], dtype), lengths)
@@ -322,7 +322,7 @@ class UnfinishedRun:
     """
 
     def __init__(self, directory: Path) -> None:
-        """Create no file yet: `begin` and `resume` do."""
+        """Prepare access; `begin` and `resume` create the files."""
         self.directory = directory
         self.folder = directory / FOLDER
         self._lock: FolderLock | None = None
@@ -345,7 +345,7 @@ class UnfinishedRun:
         """Acquire the right to write.
 
         Raises:
-            RunDirectoryError: Another process has it.
+            RunDirectoryError: Another process has the right.
             OSError: The lock file can't be created.
         """
         self._lock = self._lock or FolderLock(self.directory, LOCK_NAME)
@@ -419,7 +419,7 @@ class UnfinishedRun:
             sync: Whether to flush the journal to the disk now.
 
         Raises:
-            OSError: They can't be written; the commit before is still the last one.
+            OSError: The rows can't be written; the commit before is still the last one.
         """
         rows = {name: table.rows for name, table in self._tables.items()}
         self.journal.add("commit", f"[{step},[{','.join(map(str, rows.values()))}]]")
@@ -462,7 +462,7 @@ class UnfinishedRun:
 
         Args:
             keep: Whether the run can be resumed later; else the folder is removed.
-            undo: Whether to remove what was written since the last commit, as after a failed write.
+            undo: Whether to remove all rows since the last commit, as after a failed write.
         """
         if self._journal is not None:
             self._journal.close(undo=undo)
@@ -520,5 +520,5 @@ def read_committed(path: Path, end: int, name: str) -> pa.Table:
     rows = [entry for entry in read_rows(path, end) if entry.spec.name == name]
     if not rows:
         raise ArtifactError(f"{path} names the table {name!r}, but has no rows of it")
-    last: LoggedRows = rows[-1]  # its dictionaries hold the words of all
+    last: LoggedRows = rows[-1]  # the last dictionaries hold the words of all rows
     return table_of([(entry.chunk, entry.rows) for entry in rows], last.spec, last.words)

@@ -35,7 +35,7 @@ class Verification:
     """The result of comparing a run with its seal.
 
     Attributes:
-        differing: How files and fields of the manifest differ from what was stored, by name.
+        differing: The differences of files and fields of the manifest from the seal, by name.
         foreign: Files in the directory that are not part of the run.
         digest: The seal's digest; None if the run has no seal.
     """
@@ -91,7 +91,7 @@ def verify_run(directory: Path | str) -> Verification:
 
 
 def foreign_files(root: Path, manifest: Manifest) -> list[str]:
-    """Return what is in a run directory and is not part of the run, as text for a terminal.
+    """Return the entries of a run directory that are not part of the run, as text for a terminal.
 
     Raises:
         OSError: The directory can't be read.
@@ -113,7 +113,7 @@ def foreign_files(root: Path, manifest: Manifest) -> list[str]:
 
 
 def _differing_parts(root: Path, manifest: Manifest) -> dict[str, str]:
-    """Return how files and fields differ from their seal."""
+    """Describe how files and fields differ from the seal, by name."""
     if manifest.seal is None:
         return {f"{FILE_NAME}: seal": "is missing"}
     differing = _differing_fields(root, manifest.seal)
@@ -127,7 +127,7 @@ def _differing_parts(root: Path, manifest: Manifest) -> dict[str, str]:
 
 
 def _differing_fields(root: Path, seal: Seal) -> dict[str, str]:
-    """Return the fields of the manifest that are not as they were sealed."""
+    """Return the fields of the manifest that differ from the seal."""
     text = read_bytes(path_in(root, FILE_NAME), FILE_BYTES, RunDirectoryError)
     content = json_of(root / FILE_NAME, text)
     fields = digest_fields(content)
@@ -156,7 +156,7 @@ def _has_content(root: Path, name: str, stored: TableRecord) -> bool:
 
 
 def _difference(root: Path, name: str, record: FileRecord) -> str:
-    """Return how a file differs from what was sealed; empty if it doesn't."""
+    """Describe how a file differs from its seal; empty if it doesn't."""
     try:
         path = path_in(root, name)
         size = path.stat().st_size

@@ -37,7 +37,7 @@ DAY = timedelta(days=1)
 DEGREE = 10_000_000
 CIRCLE = 360 * DEGREE
 OBLIQUITY = 234_393_000
-# How far below the horizon the middle of the sun is when its upper edge appears, by refraction.
+# With refraction, the sun's upper edge appears while its centre is this far below the horizon.
 HORIZON = -8_330_000
 # It dawns from half an hour before sunrise to half an hour after it, and likewise at sunset.
 TWILIGHT = timedelta(minutes=30)
@@ -52,7 +52,7 @@ class Clock:
             where each day has 24 hours.
         step_us: Length of a step [us].
         steps: Number of steps; the last is steps - 1.
-        sun: The sun over the home; None: it doesn't matter.
+        sun: The sun over the home; None: the light doesn't depend on it.
 
     Example:
         >>> clock = Clock(datetime(2026, 1, 5), step_us=1_000_000, steps=3600)
@@ -77,7 +77,7 @@ class Clock:
         return self.start + step * self.step_us * MICROSECOND
 
     def times(self, steps: I64) -> NDArray[np.datetime64]:
-        """Return what the clock reads at steps, datetime64[us]."""
+        """Return the local times of steps, datetime64[us]."""
         return readings_of(self.start, steps * self.step_us).astype("M8[us]")
 
     def stamp(self, step: int) -> np.datetime64:
@@ -89,7 +89,7 @@ class Clock:
         return self.moments(steps * self.step_us)
 
     def moments(self, elapsed_us: I64) -> NDArray[np.datetime64]:
-        """Return moments given in microseconds since the start, as tables hold them."""
+        """Return moments [us since the start] as tables hold them."""
         return np.datetime64(self._start_us, "us") + elapsed_us.astype("m8[us]")
 
     def texts(self, steps: I64) -> list[str]:
@@ -107,7 +107,7 @@ class Clock:
         """Return the microseconds from the start to a local time; negative before the start.
 
         Raises:
-            InputError: It has an offset, and the home has no time zone.
+            InputError: The time has an offset, and the home has no time zone.
         """
         if moment.tzinfo is not None and self.zone is None:
             raise InputError(
@@ -117,7 +117,7 @@ class Clock:
         return (moment - self.start) // MICROSECOND
 
     def reading(self, ordinal: int, second: int) -> int:
-        """Return when the clock reads a time of a day [us since the start].
+        """Return the moment at which the clock reads a time of day [us since the start].
 
         Args:
             ordinal: The ordinal of the day's date.
@@ -131,7 +131,7 @@ class Clock:
         return stamp_us(self.start)
 
     def next_change(self, step: int) -> int | None:
-        """Return the first step after another one at which the offset from UTC is a new one."""
+        """Return the first step after another one at which the offset from UTC changes."""
         zone = self.zone
         change = zone.next_change(zone.at(self.time(step))) if zone else None
         return None if change is None else self.step_at_or_after(self.elapsed(change))
@@ -156,7 +156,7 @@ def next_midnight(moment: datetime) -> datetime:
 def midnights(begin: datetime, end: datetime | None = None) -> Iterator[datetime]:
     """Yield the midnight that begins the day of a moment, and all later ones before `end`.
 
-    A date that a time zone left out, as islands that changed sides of the date line did, has none.
+    A date that a time zone skipped, as on islands that moved across the date line, has none.
 
     >>> [midnight.day for midnight in midnights(datetime(2026, 1, 5, 8), datetime(2026, 1, 7, 1))]
     [5, 6, 7]
@@ -176,12 +176,11 @@ ALMANAC = date(2000, 1, 1).toordinal()
 class Sun:
     """The sun over a home, by the low-precision formulas of the Astronomical Almanac.
 
-    Computed in integers; times are right within a minute or two, in the centuries around 2000.
+    Computed in integers; times are accurate to a minute or two in the centuries around 2000.
 
     Attributes:
         latitude_deg: The latitude of the home, north is positive; the sun rises on each day.
-        noon: When the sun is highest by the home's clock without summer time, in the mean of the
-            year.
+        noon: Solar noon by the home's clock without summer time, averaged over the year.
         zone: The clock of the home, if it has a time zone.
 
     Example:
@@ -203,7 +202,7 @@ class Sun:
         return noon - timedelta(seconds=half_day_s), noon + timedelta(seconds=half_day_s)
 
     def shares(self, times: NDArray[np.datetime64]) -> F64:
-        """Return how much of the light of day there is: 1 by day, 0 at night, a line in between.
+        """Return the share of daylight: 1 by day, 0 at night, linear in between.
 
         Args:
             times: Local times, datetime64[us] (n,).
@@ -225,14 +224,14 @@ class Sun:
         return rise if time < rise else None
 
     def next_begin(self, time: datetime) -> datetime:
-        """Return when a night begins next after a moment."""
+        """Return the beginning of the next night after a moment."""
         fall = self.day(time.toordinal())[1]
         return fall if fall > time else self.day(time.toordinal() + 1)[1]
 
 
 @lru_cache(4096)
 def _sun_on(ordinal: int, latitude: int) -> tuple[int, int]:
-    """Return half of the length of a day, and how early the sun is at noon [s]."""
+    """Return half of the length of a day, and the equation of time [s]."""
     days = ordinal - ALMANAC
     anomaly = 3_575_280_000 + 9_856_003 * days
     mean = 2_804_600_000 + 9_856_474 * days

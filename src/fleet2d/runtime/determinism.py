@@ -1,4 +1,4 @@
-"""What makes results the same everywhere: random streams addressed by step, and sums in order.
+"""Reproducible arithmetic: random streams addressed by step, and sums in a fixed order.
 
 Each component has a random stream for each purpose. A draw is a function of (seed, component's path
 in the scenario, purpose, step, number of the draw). It doesn't depend on the order in which
@@ -75,7 +75,7 @@ def sum_in_order(values: Iterable[float]) -> float:
 
 
 def exp2(x: float) -> float:
-    """Return 2 to the power x, with the same bits on every machine, as those of libm are not.
+    """Return 2 to the power x, with the same bits on every machine, unlike libm.
 
     The relative error is below 1e-15: Taylor's series of 18 terms after splitting off the integer.
 

@@ -1,4 +1,4 @@
-"""Events: what happens in a run, for its tables, algorithms and scripts."""
+"""Events of a run, for its tables, algorithms and scripts."""
 
 from collections.abc import Callable
 from enum import StrEnum
@@ -12,7 +12,7 @@ HOME = ""
 class EventKind(StrEnum):
     """Every kind of event that Fleet2D itself records.
 
-    A behavior that records others declares them by `records` in its class.
+    A behavior that records other kinds declares them in `records`.
     """
 
     __repr__ = str.__repr__
@@ -114,8 +114,8 @@ class Event(NamedTuple):
 
     Attributes:
         step: The step at which it happened.
-        entity: Name of the body or object that it happened to; empty for the home.
-        event: Its kind: one of EventKind, or one that a behavior declares.
+        entity: Name of the body or object concerned; empty for the home.
+        event: The kind: one of EventKind, or one that a behavior declares.
         detail: Details by kind; for a camera's event, the person or robot seen or lost.
     """
 
@@ -126,9 +126,9 @@ class Event(NamedTuple):
 
     @property
     def rank(self) -> int:
-        """The order among the events of one entity at one step: plans, cameras, the home."""
+        """The rank among events of one entity at one step: plans, cameras, the home."""
         return RANKS.get(self.event, 0)
 
 
-# Makes an event from a tuple of its fields without calling Python code, as a run has many.
+# A run has many events: this makes one from a tuple of its fields without calling Python code.
 new_event: Callable[[tuple[int, str, str, str]], Event] = partial(tuple.__new__, Event)

@@ -1,7 +1,7 @@
-"""Local time of a home whose clocks change: its offsets from UTC, and moments that know theirs.
+"""Local time of a home whose clocks change: its offsets from UTC, and moments with an offset.
 
-Steps of a run are uniform; what a clock on the wall reads is not. A `Zone` maps between both, in
-integers. A time that the clock never reads is the first moment after the gap, one that it reads
+Steps of a run are uniform; the readings of a clock on the wall are not. A `Zone` maps between both,
+in integers. A time that the clock never reads is the first moment after the gap, one that it reads
 twice is the first of both.
 """
 
@@ -22,7 +22,7 @@ _SECOND_US = 1_000_000
 _LARGEST_OFFSET_S = 24 * 3600
 # Rules don't change a clock twice within this time.
 _STRIDE_S = 6 * 3600
-# How far before and after a run its schedules look.
+# Schedules look this far beyond the beginning and the end of a run.
 _MARGIN = timedelta(days=9)
 
 
@@ -32,9 +32,9 @@ class Zone(tzinfo):
     Attributes:
         label: The name of the time zone.
         standard_us: Its offset without summer time [us].
-        changes_us: When the offset changes [us since 1970 UTC], in order.
+        changes_us: Moments at which the offset changes [us since 1970 UTC], in order.
         offsets_us: The offset before the first change, and after each [us].
-        covers_us: The time whose changes it knows [us since 1970 UTC].
+        covers_us: The first and last moment between which changes are known [us since 1970 UTC].
 
     Example:
         >>> berlin = zone_of("Europe/Berlin", datetime(2026, 10, 24), datetime(2026, 10, 26))
@@ -56,16 +56,17 @@ class Zone(tzinfo):
         self.changes_us = changes_us
         self.offsets_us = offsets_us
         self.covers_us = covers_us
-        # What the clock reads when a part of constant offset is over, and when the next begins.
+        # The clock's readings at the end of each part of constant offset, and at the start of the
+        # next.
         self._over = [at + offsets_us[i] for i, at in enumerate(changes_us)]
         self._begins = [at + offsets_us[i + 1] for i, at in enumerate(changes_us)]
 
     @classmethod
     def of_record(cls, record: Mapping[str, Any], covers_us: tuple[int, int] = (0, 0)) -> Self:
-        """Return the clock that a record of it describes.
+        """Return the clock that a record describes.
 
         Raises:
-            KeyError, TypeError, ValueError: It isn't one.
+            KeyError, TypeError, ValueError: The record isn't valid.
         """
         moments = [datetime.fromisoformat(text) for text, _ in record["changes"]]
         changes = tuple(wall_us(moment.astimezone(UTC)) for moment in moments)
@@ -79,7 +80,7 @@ class Zone(tzinfo):
 
     @property
     def record(self) -> dict[str, Any]:
-        """Its name and offsets as plain data; moments are UTC."""
+        """The name and offsets as plain data; moments are UTC."""
         moments = [EPOCH + timedelta(microseconds=at) for at in self.changes_us]
         offsets = [offset // _SECOND_US for offset in self.offsets_us]
         changes = zip(moments, offsets[1:], strict=True)
@@ -91,12 +92,12 @@ class Zone(tzinfo):
         }
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how to make it again, as for a checkpoint."""
+        """Return the constructor and its arguments, for pickle and copy."""
         of_clock = self.label, self.standard_us, self.changes_us, self.offsets_us
         return Zone, (*of_clock, self.covers_us)
 
     def __eq__(self, other: object) -> bool:
-        """Return whether it is the same clock."""
+        """Return whether the clocks are the same."""
         return isinstance(other, Zone) and self.__reduce__() == other.__reduce__()
 
     def __hash__(self) -> int:
@@ -110,10 +111,10 @@ class Zone(tzinfo):
         return self.label
 
     def dst(self, _: datetime | None) -> None:
-        """Return nothing: which part of an offset is summer time isn't known."""
+        """Return None: offsets don't tell which part of them is summer time."""
 
     def utcoffset(self, moment: datetime | None) -> timedelta | None:
-        """Return the offset of what the clock reads, the first or (`fold`) the second time."""
+        """Return the offset of a reading, the first or (`fold`) the second time."""
         if moment is None:
             return None
         utc_us = self.utc_us(wall_us(moment), moment.fold)
@@ -128,7 +129,7 @@ class Zone(tzinfo):
         return self.offsets_us[bisect_right(self.changes_us, utc_us)]
 
     def utc_us(self, reading_us: int, fold: int = 0) -> int:
-        """Return when the clock reads a time [us since 1970]: the first time, or the last one."""
+        """Return the moment of a reading [us since 1970]: the first, or with `fold` the last."""
         if not fold:
             part = bisect_right(self._over, reading_us)
             utc_us = reading_us - self.offsets_us[part]
@@ -144,13 +145,13 @@ class Zone(tzinfo):
         return LocalTime.read(EPOCH + timedelta(microseconds=reading_us), self, fold)
 
     def at(self, reading: datetime) -> "LocalTime":
-        """Return when the clock reads a time; a time with an offset of its own is exact."""
+        """Return the moment of a reading; a time with an offset of its own is exact."""
         if isinstance(reading, LocalTime) and reading.tzinfo is self:
             return reading
         return self.moment(self.utc_of(reading))
 
     def utc_of(self, time: datetime) -> int:
-        """Return a moment [us since 1970 UTC]; a time without offset is what the clock reads."""
+        """Return a moment [us since 1970 UTC]; a time without offset is a reading of the clock."""
         if isinstance(time, LocalTime):
             return time.utc_us
         if time.tzinfo is not None:
@@ -158,12 +159,12 @@ class Zone(tzinfo):
         return self.utc_us(wall_us(time), fold=time.fold)
 
     def readings(self, utc_us: I64) -> I64:
-        """Return what the clock reads at moments [us since 1970]."""
+        """Return the readings of the clock at moments [us since 1970]."""
         part = np.searchsorted(np.array(self.changes_us, np.int64), utc_us, side="right")
         return utc_us + np.array(self.offsets_us, np.int64)[part]
 
     def moments(self, readings_us: I64) -> I64:
-        """Return the first moments at which the clock reads times [us since 1970 UTC]."""
+        """Return the first moments with some readings [us since 1970 UTC]."""
         part = np.searchsorted(np.array(self._over, np.int64), readings_us, side="right")
         earliest = np.array([np.iinfo(np.int64).min, *self.changes_us])
         utc_us = readings_us - np.array(self.offsets_us, np.int64)[part]
@@ -186,7 +187,7 @@ class Zone(tzinfo):
         return zone_of(self.label, first, last)
 
     def next_change(self, time: "LocalTime") -> "LocalTime | None":
-        """Return when the clock is changed next after a moment."""
+        """Return the next change of the clock after a moment."""
         later = bisect_right(self.changes_us, time.utc_us)
         return self.moment(self.changes_us[later]) if later < len(self.changes_us) else None
 
@@ -195,7 +196,7 @@ class Zone(tzinfo):
         return reading.tzinfo is None and wall_us(self.at(reading)) != wall_us(reading)
 
     def oddity(self, reading: datetime) -> str:
-        """Return why a time is not one moment, and which it stands for; empty if it is."""
+        """Explain a time that the clock reads never or twice; empty for other times."""
         if reading.tzinfo is not None:
             return ""
         first, last = (self.moment(self.utc_us(wall_us(reading), fold)) for fold in (0, 1))
@@ -215,9 +216,9 @@ class Zone(tzinfo):
 class LocalTime(datetime):
     """A moment, by the clock of a home: it reads as local time and counts in real time.
 
-    Its date, hour and text are what the clock reads, with the offset. A duration added to it passes
-    in reality, and the difference of two is the time between them, also when clocks change. A plain
-    `datetime` compared with it is something written: the first moment when the clock reads so.
+    Its date, hour and text are those of the clock, with the offset. Durations added to it and
+    differences of two are real time, also when clocks change. A plain `datetime` compared with it
+    stands for the first moment with that reading.
 
     Example:
         >>> berlin = zone_of("Europe/Berlin", datetime(2026, 3, 28), datetime(2026, 3, 30))
@@ -238,7 +239,7 @@ class LocalTime(datetime):
 
     @property
     def zone(self) -> Zone:
-        """The clock that it is read from."""
+        """The clock of the moment."""
         assert isinstance(self.tzinfo, Zone)
         return self.tzinfo
 
@@ -273,11 +274,11 @@ class LocalTime(datetime):
         return -(self - other) if isinstance(other, datetime) else NotImplemented
 
     def __eq__(self, other: object) -> bool:
-        """Return whether it is the same moment."""
+        """Return whether the moments are the same."""
         return isinstance(other, datetime) and self.utc_us == self.zone.utc_of(other)
 
     def __ne__(self, other: object) -> bool:
-        """Return whether it is another moment."""
+        """Return whether the moments differ."""
         return not self == other
 
     def __hash__(self) -> int:
@@ -310,23 +311,23 @@ class LocalTime(datetime):
 
 
 def wall_us(time: datetime) -> int:
-    """Return what a clock reads at a time [us since 1970], whatever its offset."""
+    """Return the reading of a clock at a time [us since 1970], without its offset."""
     hours = (time.toordinal() - _EPOCH_DAY) * 24 + time.hour
     return ((hours * 60 + time.minute) * 60 + time.second) * _SECOND_US + time.microsecond
 
 
 def written(time: datetime) -> datetime:
-    """Return what the clock reads at a time, as a datetime without offset."""
-    return datetime.combine(time.date(), time.time())  # which keep `fold`
+    """Return the reading of the clock at a time, as a datetime without offset."""
+    return datetime.combine(time.date(), time.time())  # both keep `fold`
 
 
 def at_reading(time: datetime, reading: datetime) -> datetime:
-    """Return when the clock of a time reads another one; without a time zone, the reading."""
+    """Return the moment of a reading on the clock of a time; without a time zone, the reading."""
     return time.zone.at(reading) if isinstance(time, LocalTime) else reading
 
 
 def next_reading(time: datetime, reading: datetime) -> datetime:
-    """Return when the clock reads a later time next; when it is changed, if that is earlier."""
+    """Return the next moment of a reading, or the next change of the clock if that is earlier."""
     if not isinstance(time, LocalTime):
         return reading
     due = time + (reading - written(time))
@@ -335,12 +336,12 @@ def next_reading(time: datetime, reading: datetime) -> datetime:
 
 
 def stamp_us(time: datetime) -> int:
-    """Return a time as tables hold it: [us since 1970], of UTC if it has an offset."""
+    """Return a time as tables hold it [us since 1970]: as UTC if it has an offset."""
     return time.utc_us if isinstance(time, LocalTime) else wall_us(time)
 
 
 def readings_of(start: datetime, elapsed_us: I64) -> I64:
-    """Return what the clock reads at moments after a start [us since 1970]."""
+    """Return the readings of the clock at moments after a start [us since 1970]."""
     times_us = stamp_us(start) + elapsed_us
     return start.zone.readings(times_us) if isinstance(start, LocalTime) else times_us
 
@@ -350,8 +351,8 @@ def even_parts(start: datetime, first_us: int, end_us: int) -> Iterator[tuple[in
 
     Args:
         start: The start of the run.
-        first_us: From when on [us since the start].
-        end_us: Until when.
+        first_us: The beginning of the time [us since the start].
+        end_us: The end of the time [us since the start].
 
     Yields:
         The beginning and the end of the part [us since the start], and what the clock would have
@@ -370,9 +371,9 @@ def zone_of(name: str, begin: datetime, end: datetime) -> Zone:
     """Return the clock of a time zone, by the rules that this machine has for it.
 
     Args:
-        name: Its name, like Europe/Berlin.
+        name: The name of the time zone, like Europe/Berlin.
         begin: The start of the run; without offset it is local time.
-        end: About its end.
+        end: About the end of the run.
 
     Raises:
         KeyError: There is no such time zone.
@@ -381,12 +382,12 @@ def zone_of(name: str, begin: datetime, end: datetime) -> Zone:
 
 
 def span_us(begin: datetime, end: datetime) -> tuple[int, int]:
-    """Return what clocks read at the beginning and the end of a time [us since 1970]."""
+    """Return the readings of clocks at the beginning and the end of a time [us since 1970]."""
     return wall_us(begin), wall_us(end)
 
 
 def rules_of(name: str) -> tzinfo:
-    """Return what this machine knows of a time zone.
+    """Return this machine's rules for a time zone.
 
     Raises:
         KeyError: There is no such time zone.
@@ -395,7 +396,7 @@ def rules_of(name: str) -> tzinfo:
 
     try:
         return ZoneInfo(name)
-    except (ValueError, OSError) as error:  # such as '../x', or a folder
+    except (ValueError, OSError) as error:  # names like '../x', or of a folder
         raise KeyError(name) from error
 
 

@@ -1,7 +1,7 @@
 """The memory of a process: rare garbage collection during imports and runs, and its peak.
 
 Hardly any objects of a run are in reference cycles, so they are freed without garbage collection.
-To collect after every 700 new objects, as Python does, takes up to a quarter of the time of a run
+Collecting after every 700 new objects, as Python does, takes up to a quarter of the time of a run
 with many people, and a sixth of the time of all imports.
 """
 
@@ -16,7 +16,7 @@ from threading import Lock
 # New objects between two collections.
 OBJECTS = 100_000
 
-# Objects that a process may have before it imports Fleet2D, for these to be left out, too.
+# With fewer objects than this before the import, these are exempted from collection, too.
 FEW_OBJECTS = 20_000
 
 # Free memory that the allocator keeps, and the size from which on an array has pages of its own:
@@ -34,7 +34,7 @@ _usual = gc.get_threshold()
 
 @contextmanager
 def rare_collections() -> Iterator[None]:
-    """Let Python collect garbage rarely until nothing in this process is within the context.
+    """Collect garbage rarely while any thread of this process is within the context.
 
     Example:
         >>> with rare_collections():
@@ -61,9 +61,9 @@ def rare_collections() -> Iterator[None]:
 def library_imports() -> Iterator[None]:
     """Collect rarely while modules are imported, and never again look for garbage in them.
 
-    Modules live to the end, and to look through them, mostly when Python exits, takes a fifth of
-    the time of a short process. What was there before is left out with them, and would remain if it
-    became garbage, so that is only done in a process that had few objects.
+    Modules live to the end, and scanning them, mostly when Python exits, takes a fifth of the time
+    of a short process. Older objects are left out with them, and would remain as garbage, so this
+    is only done in a process that had few objects.
 
     Example:
         >>> with library_imports():
@@ -79,8 +79,8 @@ def library_imports() -> Iterator[None]:
 def keep_free_memory() -> None:
     """Let the C allocator keep the memory of freed arrays for the next ones.
 
-    It returns that of arrays above 128 KB to the system at first, and requests it again, page by
-    page: a tenth of the time of a short run. `release_memory` returns all that is free. Other
+    By default it returns memory of arrays above 128 KB to the system, and requests it again page by
+    page: a tenth of the time of a short run. `release_memory` returns all free memory. Other
     allocators than GNU's stay as they are.
     """
     import ctypes
@@ -94,7 +94,7 @@ def keep_free_memory() -> None:
 def release_memory() -> None:
     """Collect garbage, and return memory that is free to the system, where that is possible.
 
-    The allocators of C and of Arrow keep what was freed: in years of simulation some dozens of MB.
+    The allocators of C and of Arrow keep freed memory: some dozens of MB in years of simulation.
     """
     import ctypes  # takes time, and short runs don't need it
 

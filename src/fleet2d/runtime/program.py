@@ -4,7 +4,7 @@ A message is a line of JSON, ended by a newline. It may be followed by blocks of
 and sizes its key `blocks` lists, as [["evidence", 1024]]: tables are Arrow IPC streams. A program
 reads messages from its standard input and answers each by one on its standard output:
 
-    start    what the run is               ready
+    start    facts about the run           ready
     update   tables of the history         output, or none
     decide   where a body is               plan, or none
     save     nothing                       state, with one block of any bytes
@@ -32,11 +32,11 @@ VERSION = 1
 MAX_BLOCK = 256 << 20
 MAX_LINE = 16 << 20
 READ_SIZE = 1 << 20
-# So many parts of an answer wait to be read; a program that writes more waits, too.
+# At most this many parts of an answer wait to be read; a program that writes more has to wait.
 READ_AHEAD = 4
 # Time for a program to end by itself [s].
 END_S = 1.0
-# The end of what it wrote on stderr that an error quotes [characters].
+# An error quotes this much of the end of a program's stderr [characters].
 QUOTED = 500
 
 
@@ -60,13 +60,13 @@ class ExternalProgram:
 
     Attributes:
         wall_s: Time that it took to answer so far [s].
-        asked: How often it was asked.
+        asked: Number of messages sent to it.
     """
 
     def __init__(
         self, program: Path, arguments: Sequence[str], timeout_s: float, start: Mapping[str, Any]
     ) -> None:
-        """Note what to run.
+        """Note the command; the program starts with the first message.
 
         Args:
             program: The program, which runs in its folder; what runs it follows from its suffix:
@@ -85,7 +85,7 @@ class ExternalProgram:
         self.asked = 0
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy needs, with the state that the program saves."""
+        """Return the attributes of a copy, with the state that the program saves."""
         state = self._state
         if self._process is not None:
             state = self.ask({"type": "save"}, expected="state").blocks.get("state")
@@ -192,17 +192,17 @@ class ExternalProgram:
         return answer
 
     def _take_arrived(self) -> None:
-        """Take what has arrived since the last answer, so that it isn't taken for the next one."""
+        """Take the output since the last answer, so that it isn't mistaken for the next one."""
         with contextlib.suppress(Empty):
             while part := self._parts.get_nowait():
                 self._unread += part
-            self._parts.put(part)  # the end, which the next answer has to meet
+            self._parts.put(part)  # the next answer has to meet the end, too
 
     def _transfer(self, message: bytes) -> Answer | None:
         """Write a message, and read the answer; return None if the program has ended.
 
         Raises:
-            TimeoutError: It doesn't answer in time.
+            TimeoutError: The program doesn't answer in time.
             ValueError: It answers with something else.
         """
         self._messages.put(message)
@@ -225,7 +225,7 @@ class ExternalProgram:
         """Return an answer that has arrived as a whole; else None, and the size to wait for.
 
         Raises:
-            ValueError: It isn't an answer.
+            ValueError: The output is no answer.
         """
         end = self._unread.find(b"\n", 0, MAX_LINE) + 1
         if not end:
@@ -257,7 +257,7 @@ class ExternalProgram:
 
 
 def _write(pipe: IO[bytes], messages: "SimpleQueue[bytes | None]") -> None:
-    """Write messages to a program until there is None, or it has ended, maybe with an answer."""
+    """Write messages to a program until a None, or until the program has ended."""
     with contextlib.suppress(OSError, ValueError):
         while (message := messages.get()) is not None:
             unwritten = memoryview(message)
@@ -266,7 +266,7 @@ def _write(pipe: IO[bytes], messages: "SimpleQueue[bytes | None]") -> None:
 
 
 def _read(pipe: IO[bytes], parts: "Queue[bytes]") -> None:
-    """Read what a program writes; an empty part is its end."""
+    """Read the output of a program in parts; an empty part marks the end."""
     with contextlib.suppress(OSError, ValueError):
         while part := pipe.read(READ_SIZE):
             parts.put(part)
@@ -290,7 +290,7 @@ def _end(
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-    while reader.is_alive():  # it waits for room, and there is no more than what has arrived
+    while reader.is_alive():  # the reader waits for room in the queue, and no more output is needed
         with contextlib.suppress(Empty):
             parts.get(timeout=0.01)
     with contextlib.suppress(OSError):

@@ -17,8 +17,8 @@ def progress_bar(*, show: bool, counts: bool = True) -> "Iterator[Progress]":
     """Yield the tasks whose progress is shown.
 
     Args:
-        show: Whether it is shown at all.
-        counts: Whether a bar says how many are done, rather than the percentage.
+        show: Whether progress is shown at all.
+        counts: Whether a bar shows the number done rather than the percentage.
     """
     from rich.console import Console
     from rich.progress import (

@@ -1,9 +1,9 @@
 """A child process that reads files of floor plans and bags, within limits of time and memory.
 
-What parses a file, much of it in libraries, and finds its rooms may crash, hang or swell. Then the
-child dies, and its parent raises an error of one line. A process starts its child for the first
-file, and keeps it. The child gets a function and the content of files by pickle, and answers in
-JSON, which the parent checks: what came of hostile bytes is hostile, too.
+Parsing a file and finding its rooms, much of it in libraries, may crash, hang or exhaust memory.
+Then the child dies, and its parent raises an error of one line. A process starts its child for the
+first file, and keeps it. The child gets a function and the content of files by pickle, and answers
+in JSON, which the parent checks, since the answer to a hostile file may be hostile, too.
 """
 
 import atexit
@@ -48,17 +48,17 @@ except ImportError:  # on Windows
 
 T = TypeVar("T")
 
-# By the clock a file may take so many times its processor time, which others may use meanwhile.
+# A file may take this multiple of its processor time by the clock, as others use the processor.
 PATIENCE = 10
-# What is raised by an answer that isn't valid.
+# An answer that isn't valid raises one of these.
 WRONG = (ValueError, TypeError, KeyError, RecursionError, shapely.errors.ShapelyError)
 _CODE = "from fleet2d.storage.apart import serve; serve()"
 _VARIABLES = "FLEET2D_MAX_"
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",  # each thread takes memory
-    "ARROW_DEFAULT_MEMORY_POOL": "system",  # others reserve a gigabyte
-    # Freed arrays are used again. To return them to the system, and get them back page by page,
-    # takes as long as to read a picture.
+    "ARROW_DEFAULT_MEMORY_POOL": "system",  # other pools reserve a gigabyte
+    # Freed memory is kept: returning it to the system, and getting it back page by page, takes as
+    # long as reading a picture.
     "MALLOC_MMAP_THRESHOLD_": str(1 << 30),
     "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
 }
@@ -109,7 +109,7 @@ def apart(
             data, dataclasses, arrays, meshes and polygons.
         arguments: Its arguments, among them the content of the file.
         failure: The type of the error about the file.
-        seconds: The processor time that it may take.
+        seconds: The processor time that the function may take [s].
 
     Raises:
         InputError: The function raises it or fails, it exceeds a limit, or the child dies; of the
@@ -132,7 +132,7 @@ def apart(
                 f"{path} can't be read: its reader gave no valid answer: export the file again"
             ) from None
         if isinstance(result, _Failure) and result.kind in ("memory", "other"):
-            _stop()  # what it may still hold is no base for the next file
+            _stop()  # the child may still hold much memory, so the next file gets a new one
     if not isinstance(result, _Failure):
         return result
     place = result.place
@@ -156,7 +156,7 @@ def _exchange(read: object, rest: object, patience: float) -> bytes:
         return answer if len(answer) == length else b""
     except BrokenPipeError:
         return b""
-    except BaseException:  # its answer must not be taken for that to the next request
+    except BaseException:  # the answer must not be taken for that to the next request
         _stop()
         raise
     finally:
@@ -200,18 +200,18 @@ def _stop(grace: float = 0.0) -> int:
 
 
 def _close(process: Popen[bytes]) -> None:
-    """Close the pipes to a child, at which it ends, also while another thread writes to one."""
+    """Close the pipes to a child, which makes it end, even while another thread writes to one."""
     for pipe in (process.stdin, process.stdout):
         cast("BufferedWriter", pipe).raw.close()
 
 
 def _forget() -> None:
-    """Leave the child to end by itself, or to the process that this one was forked from."""
+    """Drop the child, which ends by itself or belongs to the process before a fork."""
     global _child, _lock
     _lock = Lock()
     if _child is not None:
         _close(_child)
-        _child.returncode = 0  # nobody has to wait for it
+        _child.returncode = 0  # this process doesn't have to wait for the child
         _child = None
 
 
@@ -265,7 +265,7 @@ def _decode(answer: bytes, kind: Any) -> Any:
     """Return the value in an answer, of a type, or the failure.
 
     Raises:
-        Exception: It is neither: one of `WRONG`.
+        Exception: The answer is neither; one of `WRONG`.
     """
     if answer.count(b",") > JSON_VALUES.limit:
         raise ValueError("too many values")
@@ -300,7 +300,7 @@ def _checked(content: object, kind: Any) -> Any:
 
 @cache
 def _adapter(kind: Any) -> TypeAdapter[tuple[Any]]:
-    # Within a tuple, since a dataclass alone takes no settings.
+    # A dataclass alone takes no settings, so it is wrapped in a tuple.
     settings = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
     return TypeAdapter(tuple[kind], config=settings)
 
@@ -311,14 +311,14 @@ def _adapter(kind: Any) -> TypeAdapter[tuple[Any]]:
 def serve() -> None:
     """Answer the requests of the parent, until it ends."""
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what libraries print
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what ends
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # libraries may print
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides when the child ends
     base = _size()
     while True:
         try:
             before = _size()
             read = pickle.load(sys.stdin.buffer)  # noqa: S301 - of the parent
-            base += _size() - before  # the module with its libraries
+            base += _size() - before  # plus the size of the module with its libraries
             limits, arguments, failure, seconds = pickle.load(sys.stdin.buffer)  # noqa: S301
         except EOFError:
             return
@@ -347,7 +347,7 @@ def _answer(read: Callable[..., Any], arguments: tuple[Any, ...], kind: type[Inp
         ours = next(f for f in reversed(frames) if "fleet2d" in f.filename)
         place = f"{type(error).__name__} at {Path(ours.filename).name}:{ours.lineno}"
         text = f"its reader failed ({place}, {one_line(error, 100)})"
-        failure = _Failure("memory" if "bad_alloc" in text else "other", text)  # as GEOS says
+        failure = _Failure("memory" if "bad_alloc" in text else "other", text)  # by GEOS
     return _encode({"failure": failure})
 
 
@@ -364,13 +364,13 @@ def _limit(base: int, seconds: int) -> None:
 
     Args:
         base: Size of the process when it began [bytes].
-        seconds: The processor time.
+        seconds: The processor time [s].
     """
     if resource is None:
         return
     limits = {
         resource.RLIMIT_CORE: 0,
-        resource.RLIMIT_FSIZE: LOG_BYTES.limit,  # of files that a bag unpacks to
+        resource.RLIMIT_FSIZE: LOG_BYTES.limit,  # bags are unpacked to files
         resource.RLIMIT_CPU: math.ceil(time.process_time() + seconds),
     }
     if base:

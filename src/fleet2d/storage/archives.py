@@ -1,4 +1,4 @@
-"""Packed content from anybody: what it unpacks to is bounded before it is in memory."""
+"""Archives from untrusted sources: their unpacked size is bounded before it is in memory."""
 
 import io
 import struct
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fleet2d.bounds import Bound, read_bytes
 
-# The list of members of a ZIP archive: some ten thousand take so much [bytes].
+# The list of members of a ZIP archive takes this much for some ten thousand [bytes].
 _LIST_BYTES = 1 << 20
 # The end of a ZIP archive has a mark, the size of that list, and a comment.
 _END_MARK = b"PK\5\6"
@@ -24,10 +24,10 @@ def read_arrays(path: Path, bound: Bound) -> dict[str, NDArray[Any]]:
 
     Args:
         path: The file.
-        bound: On its bytes, also when they are unpacked.
+        bound: The bound on its bytes, packed and unpacked.
 
     Raises:
-        Exception: It is damaged or forged: a damaged archive raises almost anything.
+        Exception: The file is damaged or forged: a damaged archive raises almost anything.
         InputError: It is beyond the bound, or no regular file.
     """
     content = read_bytes(path, bound)
@@ -42,7 +42,7 @@ def read_arrays(path: Path, bound: Bound) -> dict[str, NDArray[Any]]:
         bound.check(sum(member.file_size for member in members), path)
         for member in members:
             name = member.filename.removesuffix(".npy")
-            # Of other compressions, some bytes can unpack to gigabytes before anybody counts.
+            # With other compressions, a few bytes can unpack to gigabytes before they are counted.
             if member.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
                 raise ValueError(f"{name!r} is compressed in another way than NumPy does it")
             if name in arrays:
@@ -52,7 +52,7 @@ def read_arrays(path: Path, bound: Bound) -> dict[str, NDArray[Any]]:
 
 
 def _array(name: str, content: bytearray) -> NDArray[Any]:
-    """Return an array whose values are all there: its header may state any shape."""
+    """Return an array with all of its values, as its header may state any shape."""
     header = io.BytesIO(content)
     version = np.lib.format.read_magic(header)
     read = np.lib.format.read_array_header_1_0

@@ -42,7 +42,7 @@ LOG_TYPES = {
 LATEST_SIMULATED_NS = 10**17
 """Stamps below are of a simulated clock [ns]: three years."""
 
-# A quaternion that is shorter says nothing.
+# A shorter quaternion has no meaningful direction.
 SHORTEST = 1e-3
 _BAGS = (".bag", ".mcap", ".db3")
 METADATA = "metadata.yaml"
@@ -59,7 +59,7 @@ def ros_types(need: str) -> Any:
     """Return the types of messages of ROS 2, with those of vision_msgs.
 
     Args:
-        need: What rosbags is needed for, for the message.
+        need: The beginning of the message, such as "bags need rosbags".
 
     Raises:
         InputError: rosbags isn't installed.
@@ -77,7 +77,7 @@ def check_bag(path: Path, failure: type[InputError]) -> None:
     """Refuse a bag with links in its folder, or a file that is too large or not to be opened.
 
     Raises:
-        InputError: It is refused; of the type `failure`.
+        InputError: The bag is refused; of the type `failure`.
     """
     if path.is_dir():
         refuse_links(path)
@@ -99,7 +99,7 @@ def open_bag(path: Path, failure: type[InputError] = InputError) -> Iterator[Any
     Raises:
         InputError: It can't be read, or rosbags isn't installed.
     """
-    types = ros_types("bags need rosbags")  # of bags without definitions of their own
+    types = ros_types("bags need rosbags")  # for bags without definitions of their own
     from rosbags.highlevel import AnyReader
 
     try:
@@ -118,9 +118,9 @@ def stamp_ns(message: Any) -> int:
 
 
 def times_of(stamps: I64, recorded: I64) -> I64:
-    """Return the times of messages [ns]: their stamps, or when they were recorded if these are 0.
+    """Return the times of messages [ns]: their stamps, or the times of recording if these are 0.
 
-    A simulated clock begins at 0, so that this is one of its stamps.
+    A simulated clock begins at 0, so among its stamps 0 is valid.
     """
     latest = int(stamps.max(initial=0))
     has_zeros = latest == 0 or latest >= LATEST_SIMULATED_NS
@@ -134,7 +134,7 @@ def numbers_of(place: Any, turn: Any) -> list[float]:
 
 
 def unit_turns(turns: F64) -> F64:
-    """Return quaternions x, y, z, w at the length 1, float64 (n, 4); NaN if they are none."""
+    """Return quaternions x, y, z, w scaled to length 1, float64 (n, 4); NaN for invalid ones."""
     with np.errstate(all="ignore"):
         length = np.sqrt((turns * turns).sum(axis=1, keepdims=True))
         return np.where((length > SHORTEST) & (length < np.inf), turns / length, np.nan)

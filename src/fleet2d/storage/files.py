@@ -46,7 +46,7 @@ def plain_name(name: object, folder: Path | str) -> str:
         folder: The folder, or the location of a store, for the message.
 
     Raises:
-        RunDirectoryError: It isn't such a name.
+        RunDirectoryError: The name would lead out of the folder.
 
     Example:
         >>> plain_name("learned/ltp.npz", "month")
@@ -58,7 +58,7 @@ def plain_name(name: object, folder: Path | str) -> str:
     if (
         isinstance(name, str)
         and name.isprintable()
-        and not set("\\:" if os.name == "nt" else "\\") & set(name)  # names a drive by a colon
+        and not set("\\:" if os.name == "nt" else "\\") & set(name)  # a colon names a drive
         and not {"", ".", ".."} & set(name.split("/"))
     ):
         return name
@@ -85,7 +85,7 @@ def path_in(folder: Path | str, name: object) -> Path:
     path = Path(folder)
     for part in plain_name(name, folder).split("/"):
         path /= part
-        with suppress(OSError):  # nothing there, or not accessible: opening it fails, too
+        with suppress(OSError):  # opening a path that is missing or not accessible fails, too
             mode = path.lstat().st_mode
             if stat.S_ISLNK(mode):
                 raise RunDirectoryError(
@@ -105,7 +105,7 @@ def refuse_links(folder: Path, subfolders: Iterable[str] = ()) -> None:
         subfolders: Names of the folders in it that are checked, too.
 
     Raises:
-        RunDirectoryError: One is in it, or in one of the subfolders.
+        RunDirectoryError: A link, device or pipe is in the folder or in one of the subfolders.
         OSError: A folder can't be read.
     """
     for directory in (folder, *(path_in(folder, name) for name in subfolders)):
@@ -117,7 +117,7 @@ def write_all(handle: int, content: bytes | memoryview) -> None:
     """Write all bytes to an open file.
 
     Raises:
-        OSError: They can't be written; some may have been.
+        OSError: The bytes can't be written; some may have been.
     """
     rest = memoryview(content)
     while rest:
@@ -208,11 +208,11 @@ def partial_file(path: Path) -> Iterator[Path]:
 def new_folder(path: Path) -> Iterator[Path]:
     """Yield the path of a folder to be made, which appears whole or not at all.
 
-    It is made in a folder beside it, with its own name, and moved in the end. What a killed process
-    has left there is replaced.
+    The folder is made within a temporary one beside it, and moved in the end. Leftovers of a killed
+    process are replaced.
 
     Raises:
-        OSError: It can't be written, or is there already.
+        OSError: The folder can't be written, or exists already.
 
     Example:
         >>> import tempfile
@@ -245,7 +245,7 @@ def new_folder(path: Path) -> Iterator[Path]:
 
 
 def is_disk_full(error: OSError) -> bool:
-    """Whether an error means that the disk, or the user's quota, is full."""
+    """Return whether an error means that the disk, or the user's quota, is full."""
     return error.errno in _FULL
 
 
@@ -280,7 +280,7 @@ class FolderLock:
             advice: What to do if another process holds the lock, for the message.
 
         Raises:
-            RunDirectoryError: Another process holds it, or the lock file is a link.
+            RunDirectoryError: Another process holds the lock, or the lock file is a link.
             OSError: The file can't be created.
         """
         self.path = path_in(folder, name)
@@ -331,7 +331,7 @@ class FolderLock:
 def scratch_folder(prefix: str) -> Iterator[Path]:
     """Yield a temporary folder, which is removed at the end of the context.
 
-    If the process is killed before, the next one that makes a folder with this prefix removes it.
+    If the process is killed before, the next process that uses this prefix removes the folder.
 
     Example:
         >>> with scratch_folder("fleet2d-doctest-") as folder:
@@ -345,7 +345,7 @@ def scratch_folder(prefix: str) -> Iterator[Path]:
         folder = Path(tempfile.mkdtemp(prefix=prefix))
         try:
             lock = FolderLock(folder, SCRATCH_LOCK)
-        except (RunDirectoryError, FileNotFoundError):  # another process took it for abandoned
+        except (RunDirectoryError, FileNotFoundError):  # another process removed it as abandoned
             continue
         break
     try:
@@ -369,13 +369,13 @@ def _remove_abandoned(prefix: str) -> None:
 
 # Kind, bytes of the description, bytes of the content, checksum of all three and of both sizes.
 _HEADER = struct.Struct("<BIQI")
-# Frames that are buffered until they are written, unless a commit comes before [bytes].
+# Frames up to this size are buffered before they are written, unless a commit comes first [bytes].
 _BUFFER_BYTES = 1 << 22
 
 
 @dataclass(frozen=True)
 class JournalFormat:
-    """What distinguishes the journals of one purpose.
+    """The format of a kind of journal.
 
     Attributes:
         magic: The first bytes of the file, which name the format and its version.
@@ -428,8 +428,8 @@ class FrameWriter:
         Args:
             path: The file; if it is in somebody else's folder, from `path_in`.
             form: The format.
-            start: Where the commit ends [bytes], and the file is cut off; 0: create the file, in
-                place of one that is there.
+            start: The end of the commit, where the file is cut off [bytes]; 0: create the file, or
+                replace an existing one.
 
         Raises:
             OSError: The file can't be written.
@@ -478,7 +478,7 @@ class FrameWriter:
         """Write all frames so far: they survive the end of the process.
 
         Raises:
-            OSError: They can't be written; see `undo`.
+            OSError: The frames can't be written; see `undo`.
         """
         self._write()
         self.end = self._written
@@ -488,7 +488,7 @@ class FrameWriter:
         self._buffer = []
         self._size = 0
         self._written = self.end
-        with suppress(OSError):  # readers ignore what is cut off
+        with suppress(OSError):  # readers ignore the part that is cut off
             os.ftruncate(self._handle, self.end)
             os.lseek(self._handle, self.end, os.SEEK_SET)
 
@@ -501,14 +501,14 @@ class FrameWriter:
         sync(self._handle)
 
     def close(self, *, undo: bool = False) -> None:
-        """Close the file; with `undo`, remove what was written since the last commit."""
+        """Close the file; with `undo`, remove all frames since the last commit."""
         if self._handle < 0:
             return
         if undo:
             self.undo()
         handle = self._handle
         self._handle = -1
-        with suppress(OSError):  # what has to be on the disk was synced before
+        with suppress(OSError):  # the needed content was synced before
             os.close(handle)
 
     def _write(self) -> None:
@@ -548,7 +548,7 @@ def _complete_frames(file: BinaryIO, kinds: tuple[str, ...]) -> Iterator[Frame]:
     while len(header := file.read(_HEADER.size)) == _HEADER.size:
         number, text_bytes, content_bytes, checksum = _HEADER.unpack(header)
         end = start + _HEADER.size + text_bytes + content_bytes
-        # Before anything is read: a damaged size must not request all memory.
+        # Sizes are checked before reading: a damaged one must not request all memory.
         if number >= len(kinds) or end > size:
             return
         text = file.read(text_bytes)

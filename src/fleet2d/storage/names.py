@@ -1,18 +1,18 @@
 """Names that people give to users, robots, algorithms and layers, in letters of any script.
 
-They become parts of key paths, of names of tables and files, and words of expectations, so that
-letters, digits, `_` and `-` are all that they have, in the form NFKC of Unicode: of two ways
-to write the same letters there is one, and expectations read it as it is.
+They become parts of key paths, of names of tables and files, and words of expectations. So they
+consist of letters, digits, `_` and `-` in Unicode's NFKC form, in which the same letters are always
+encoded alike.
 """
 
 import unicodedata
 
-# The length of a name in UTF-8; names of files, of which it is a part, have at most 255 bytes.
+# The length in UTF-8: a name is part of file names, which have at most 255 bytes.
 MOST_BYTES = 100
 
 
 def problem_of(name: str) -> str | None:
-    """Return what is wrong with a name; None: nothing.
+    """Return the problem of a name; None if it is valid.
 
     >>> [problem_of(name) for name in ("ana", "müller", "مريم", "花子", "bolt-2")]
     [None, None, None, None, None]
@@ -28,5 +28,5 @@ def problem_of(name: str) -> str | None:
 
 
 def is_word(text: str) -> bool:
-    """Tell whether a text has only letters, with marks that belong to them, digits, `_` and `-`."""
+    """Return whether a text has only letters with their marks, digits, `_` and `-`."""
     return f"_{text.replace('-', '_')}".isidentifier()

@@ -1,7 +1,7 @@
 """Secrets of this user, in files that nobody else may read; signatures by one of them.
 
-A signature says that a file was written by this user. Only such files are unpickled: whoever could
-write another one could let it run any command.
+A signature says that a file was written by this user. Only such files are unpickled, since a pickle
+can run any command.
 """
 
 import errno
@@ -25,12 +25,12 @@ SIGNATURE_CHARACTERS = 64
 # The folder of programs' states on systems that don't follow the XDG specification.
 _USUAL = {"darwin": "~/Library/Application Support", "win32": "~/AppData/Local"}
 _IS_POSIX = os.name == "posix"
-# A link isn't followed, and a pipe not waited for.
+# Links are not followed, and a pipe doesn't block.
 _FLAGS = os.O_RDONLY | sum(getattr(os, f"O_{name}", 0) for name in ("NOFOLLOW", "NONBLOCK"))
 
 
 class UnusableSecretError(ArtifactError):
-    """This user has no secret, or somebody else may know it."""
+    """The user has no secret, or somebody else may know it."""
 
 
 def state_folder() -> Path:
@@ -51,7 +51,7 @@ def user_secret(name: str) -> bytes:
         name: The name of its file.
 
     Raises:
-        UnusableSecretError: It can't be kept, or its file isn't this user's alone.
+        UnusableSecretError: The secret can't be kept, or its file isn't this user's alone.
     """
     try:
         path = state_folder() / name
@@ -79,9 +79,9 @@ def signature(purpose: str) -> hmac.HMAC:
 
 
 def _make(path: Path) -> None:
-    """Make a secret, whole and at once: of several processes, all get that of the first."""
+    """Make a secret atomically, so that several processes all get that of the first."""
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    handle, new = tempfile.mkstemp(dir=path.parent)  # which only this user may read
+    handle, new = tempfile.mkstemp(dir=path.parent)  # only this user may read the file
     try:
         with os.fdopen(handle, "wb"):
             write_all(handle, secrets.token_urlsafe(32).encode())
