@@ -1,1 +1,1 @@
-"""Interactions: what robots want of people, how people answer, and how months change that."""
+"""Interactions: requests of robots to people, the answers, and how these change over months."""

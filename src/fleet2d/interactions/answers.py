@@ -68,11 +68,11 @@ class AnswerPart(Component):
     stage: ClassVar[Stage] = "accept"
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Return what it adds to the logit of its stage."""
+        """Return the term added to the logit of the stage."""
         raise NotImplementedError
 
 
-# From there on a robot is noticed less.
+# Beyond this distance, a robot is noticed less.
 NOTICED_WITHIN_M = 2.0
 
 
@@ -107,7 +107,8 @@ class NoticePart(AnswerPart):
         return total
 
 
-# How much an activity keeps a person from a robot; negative: not at all. Ours; see the docs.
+# Activities reduce availability by these logits; negative ones raise it. The values are our own;
+# see the docs.
 LOADS: Mapping[str, float] = {
     "sleep": 9.0,
     "nap": 6.0,
@@ -144,7 +145,7 @@ class ActivityPart(AnswerPart):
 
     Attributes:
         base: Logit of a person without an activity.
-        loads: What each activity takes off; these come before the built-in ones.
+        loads: Logit that each activity takes off; these take precedence over the built-in ones.
     """
 
     stage = "available"
@@ -177,7 +178,7 @@ class MovementPart(AnswerPart):
     """Whether the person is going somewhere.
 
     Attributes:
-        going: Added if so.
+        going: Added for a person who is.
     """
 
     stage = "available"
@@ -189,7 +190,7 @@ class MovementPart(AnswerPart):
         return self.going if now.is_moving else 0.0
 
 
-# What a person makes of each kind, before anything else. Ours; see the docs.
+# The logit of accepting each kind, before any other part. The values are our own; see the docs.
 KIND_LOGITS: Mapping[str, float] = {
     "remind": 0.6,
     "offer": -0.4,
@@ -200,12 +201,12 @@ KIND_LOGITS: Mapping[str, float] = {
 }
 
 
-# The value of an interaction that adds half of what the highest would.
+# An interaction of this value adds half of what the highest value would.
 HALF_WORTH = 2.0
 
 
 def urgency(interaction: Interaction) -> float:
-    """Return how little burden and annoyance count for an interaction: from 0 to 1, by its value.
+    """Return how much less burden and annoyance count for an interaction of its value, 0 to 1.
 
     >>> [urgency(Interaction(do="remind", to="ana", every="1 d", worth=w)) for w in (0, 2, 6)]
     [0.0, 0.5, 0.9]
@@ -214,10 +215,10 @@ def urgency(interaction: Interaction) -> float:
 
 
 class ImportancePart(AnswerPart):
-    """Its kind, and its value to the person.
+    """The kind of an interaction, and its value to the person.
 
     Attributes:
-        kinds: Logit of each kind; these come before the built-in ones.
+        kinds: Logit of each kind; these take precedence over the built-in ones.
         worth: Added for a very high value; half of it for a value of 2.
     """
 
@@ -225,7 +226,7 @@ class ImportancePart(AnswerPart):
     worth: float = 1.5
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add kind and value."""
+        """Add the terms of kind and value."""
         do = now.interaction.do
         worth = now.interaction.worth
         kind = self.kinds.get(do, KIND_LOGITS[do])
@@ -251,7 +252,7 @@ class MannerPart(AnswerPart):
     in_the_way: float = -0.8
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add the terms of its manner: from behind, too near or far, in the way."""
+        """Add the terms of the robot's manner: from behind, too near or far, in the way."""
         total = self.behind if now.from_behind else 0.0
         if not NEAREST_M <= now.distance <= FARTHEST_M:
             total += self.off
@@ -264,13 +265,13 @@ class RecencyPart(AnswerPart):
     """The time since the robot addressed the person last.
 
     Attributes:
-        at_once: Added right after it; it fades evenly within an hour.
+        at_once: Added right afterwards, fading evenly within an hour.
     """
 
     at_once: float = -1.5
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add what is left of the last time."""
+        """Add the faded term of the last time."""
         if state.last is None:
             return 0.0
         return self.at_once * max(0.0, 1 - (now.time - state.last) / timedelta(hours=1))
@@ -294,7 +295,7 @@ class BurdenPart(AnswerPart):
 
 
 class AttitudePart(AnswerPart):
-    """What months have made of the person: novelty, habit, trust and annoyance.
+    """The person's attitude after months with the robot: novelty, habit, trust and annoyance.
 
     Attributes:
         novelty: Added while the robot is new.
@@ -322,11 +323,11 @@ class Reply(NamedTuple):
     """How a person answers.
 
     Attributes:
-        outcome: What the robot sees.
+        outcome: The outcome that the robot sees.
         delay: Time from the question to the answer.
-        later: For DEFERRED: after which time the person wants to be asked again.
+        later: For DEFERRED: time after which the person wants to be asked again.
         willingness: The probability that the person was available: truth.
-        woke: Whether it woke a sleeper: truth.
+        woke: Whether the robot woke a sleeper: truth.
     """
 
     outcome: Outcome
@@ -337,7 +338,7 @@ class Reply(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """A request that came up: when, whose, and the interaction and the person."""
+    """A request that came up: its step, the robot, and the interaction and the person."""
 
     step: int
     robot: str
@@ -346,20 +347,20 @@ class Wanted(NamedTuple):
 
 
 class AnswerRecord(NamedTuple):
-    """What happened when a robot addressed a person: truth, for metrics.
+    """The result of addressing a person: truth, for metrics.
 
     Attributes:
         step: The step of the question.
         robot: The robot.
         text: The interaction and the person meant.
-        addressed: Who was addressed, maybe somebody else; empty: nobody was near.
-        activity: What that person did.
+        addressed: The person addressed, maybe another one than meant; empty: nobody was near.
+        activity: The activity of that person.
         outcome: The answer; empty if the robot wasn't noticed.
         delay_s: Time from the question to the answer [s].
         value: Value of the request at the question; 0 if it was no longer open.
-        woke: Whether it woke the person.
+        woke: Whether the robot woke the person.
         willingness: Probability that the person was available.
-        novelty, burden, annoyance, trust: The person's attitude after it.
+        novelty, burden, annoyance, trust: The person's attitude afterwards.
     """
 
     step: int
@@ -383,8 +384,8 @@ class Start(NamedTuple):
 
     Attributes:
         day_share: The time, as a part of the day.
-        kind: What the person wants: that it comes (call), an answer (question), or to be left alone
-            (complaint).
+        kind: The wish of the person: that the robot comes (call), an answer (question), or to be
+            left alone (complaint).
     """
 
     day_share: float
@@ -392,15 +393,15 @@ class Start(NamedTuple):
 
 
 class Initiative(Component):
-    """What people start by themselves: on average so often a day, at any time of it.
+    """Contacts that people start by themselves, at random times: mean numbers a day.
 
     Nothing comes of the moments at which the person is out, sleeps, or is too far away.
 
     Attributes:
-        calls: How often the person calls the robot, from anywhere in the home.
-        questions: How often the person asks a robot within 8 m something.
-        complaints: How often the person thinks about a robot in the same room: who is annoyed
-            enough sends it away, bans it or switches it off.
+        calls: Calls of the robot, from anywhere in the home.
+        questions: Questions to a robot within 8 m.
+        complaints: Thoughts about a robot in the same room: a person who is annoyed enough sends it
+            away, bans it or switches it off.
     """
 
     kind = "initiative"
@@ -419,9 +420,9 @@ class Initiative(Component):
         return sorted(starts)
 
 
-# The least and the greatest time until an answer.
+# An answer takes a time between these.
 ANSWER_TAKES = (timedelta(seconds=2), timedelta(seconds=8))
-# Annoyance beyond that of sending a robot away, at which it is banned, and switched off.
+# A robot is banned and switched off at these annoyances beyond that of sending it away.
 BAN_AFTER = 2.0
 OFF_AFTER = 5.0
 
@@ -437,26 +438,26 @@ class Answers(Component):
 
     Attributes:
         notice: Whether the robot is noticed.
-        activity: What the activity means for availability.
-        company: What other people in the room mean for it.
-        movement: What being on the way means for it.
-        importance: What the kind and the value of an interaction mean for accepting.
-        manner: What the way in which the robot comes means for it.
-        recency: What a recent interaction means for it.
-        burden: What many prompts mean for it.
-        attitude: What novelty, habit, trust and annoyance mean for it.
+        activity: The effect of the activity on availability.
+        company: The effect of other people in the room on availability.
+        movement: The effect of being on the way on availability.
+        importance: The effect of the kind and value of an interaction on accepting.
+        manner: The effect of the robot's manner of coming on accepting.
+        recency: The effect of a recent interaction on accepting.
+        burden: The effect of many prompts on accepting.
+        attitude: The effect of novelty, habit, trust and annoyance on accepting.
         months: How the attitude changes.
-        initiative: What the person starts without being addressed.
-        defers: Probability that a person who isn't available asks for it later.
-        later: Least and greatest time after which it may come again.
+        initiative: Contacts that the person starts without being addressed.
+        defers: Probability that a person who isn't available asks to be addressed later.
+        later: Least and greatest time after which the robot may come again.
         sends_away_at: Annoyance from which on the robot is sent away from the room; two more, and
             it is banned from a bedroom or bathroom; five more, and it is switched off. What is
             urgent annoys less.
-        gives_up_below: Trust below which a person who would do any of this switches it off for
-            good; 0: never.
-        away_for: For how long it is sent away.
-        bans_for: For how long it is banned.
-        off_for: For how long it is switched off.
+        gives_up_below: Trust below which a person who would do any of this switches the robot off
+            for good; 0: never.
+        away_for: Time for which the robot is sent away.
+        bans_for: Time for which the robot is banned.
+        off_for: Time for which the robot is switched off.
     """
 
     kind = "answers"
@@ -532,7 +533,7 @@ class Answers(Component):
         Args:
             state: The person's attitude.
             room: The type of the room.
-            urgent: The urgency of what the robot wants.
+            urgent: The urgency of the robot's request.
         """
         annoyance = state.annoyance * (1 - urgent)
         if annoyance < self.sends_away_at:

@@ -1,4 +1,4 @@
-"""Attitude: what months with a robot make of a person; truth, which only metrics read.
+"""Attitude of a person to a robot over months: truth, which only metrics read.
 
 Numbers for which no study is known are defaults of Fleet2D; docs/how-to/interactions.md has the
 sources and ranges of all of them.
@@ -20,10 +20,10 @@ from fleet2d.runtime.local_time import written
 BURDEN_OVER = timedelta(days=7)
 # Part of the distance to full trust that an accepted interaction gains.
 GAINS = 0.05
-# Part of the trust that is lost by a mistake, and by what was for nothing.
+# Part of the trust that a mistake costs, and a request for nothing.
 MISTAKE = 0.3
 FOR_NOTHING = 0.03
-# Half-life of what trust has lost, while nothing else happens.
+# Half-life of lost trust, while nothing else happens.
 TRUST_RECOVERS = timedelta(days=30)
 # Part of the distance to a full habit that an accepted interaction gains.
 HABIT_FORMS = 0.15
@@ -34,7 +34,7 @@ class AttitudeState:
     """A person's attitude to one robot.
 
     Attributes:
-        time: The moment that it describes.
+        time: The moment of the state.
         novelty: 1 at first, falling to 0.
         burden: Prompts a day of late, an exponential mean.
         annoyance: Accumulated by badly timed prompts, fading; 0: none.
@@ -65,8 +65,8 @@ class Attitude(Component):
     Attributes:
         novelty_lasts: Half-life of the novelty.
         annoyance_lasts: Half-life of annoyance.
-        trust: Trust at first, and what it recovers to.
-        annoyed_by: What a prompt adds to annoyance at the worst moment; at a good one nothing.
+        trust: Trust at first, to which it recovers.
+        annoyed_by: Annoyance added by a prompt at the worst moment; at a good one, none.
     """
 
     kind = "attitude"
@@ -93,7 +93,7 @@ class Attitude(Component):
     def addressed(
         self, state: AttitudeState, name: str, outcome: Outcome, willingness: float
     ) -> None:
-        """Learn from being addressed at the time of the state.
+        """Update the attitude after the person was addressed at the time of the state.
 
         Args:
             state: The attitude.
@@ -117,7 +117,7 @@ class Attitude(Component):
             self.let_down(state, outcome)
 
     def let_down(self, state: AttitudeState, outcome: Outcome = Outcome.DECLINED) -> None:
-        """Lose trust by what was for nothing, or worse."""
+        """Lower trust after a request for nothing, or a mistake."""
         is_worse = outcome in (Outcome.MISTAKEN, Outcome.SWITCHED_OFF)
         state.trust *= 1 - (MISTAKE if is_worse else FOR_NOTHING)
 

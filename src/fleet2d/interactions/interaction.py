@@ -1,4 +1,4 @@
-"""Interactions as data: what a robot wants of a person, when it is worth what, and its queue."""
+"""Interactions as data: requests of a robot to a person, their value over time, and their queue."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,17 +21,17 @@ InteractionKind = Literal["remind", "offer", "ask", "greet", "deliver", "patrol_
 
 
 class Outcome(StrEnum):
-    """What can come of addressing a person: the events of the robot that sees it."""
+    """The outcomes of addressing a person, which are events of the robot."""
 
     ACCEPTED = EventKind.ACCEPTED
     DECLINED = EventKind.DECLINED
     DEFERRED = EventKind.DEFERRED
-    # Noticed, and not answered; a robot that isn't noticed sees the same.
+    # The robot was noticed but not answered; one that isn't noticed sees the same.
     IGNORED = EventKind.IGNORED
-    # It addressed somebody else.
+    # The robot addressed somebody else.
     MISTAKEN = EventKind.MISTAKEN
     SENT_AWAY = EventKind.SENT_AWAY
-    # Banned from the room that it is in.
+    # The robot was banned from the room that it is in.
     BANNED = EventKind.BANNED
     SWITCHED_OFF = EventKind.SWITCHED_OFF
 
@@ -47,7 +47,7 @@ REQUEST_EVENTS = frozenset(
 
 
 class Interaction(Settings):
-    """Something that a robot wants of a person, again and again.
+    """A recurring request of a robot to a person.
 
     A *request* comes up at each time of `at`, or every `every`, and is open for `within`. Its value
     falls evenly from `worth` to `worth` · `falls_to` at the deadline.
@@ -56,20 +56,20 @@ class Interaction(Settings):
         do: Its kind.
         to: The person.
         by: The robot; left out: the first one.
-        about: What it is about, for reports; the person whom a question is about.
+        about: The subject, for reports; the person whom a question is about.
         fetch_from: For `deliver`: the person who has to give the object to the robot first.
         at: Times of day at which a request comes up.
-        on: The days on which it does.
+        on: The days on which requests come up.
         every: Interval between two requests, from the start on, instead of `at`.
         within: How long a request is open.
         worth: Its value if it is carried out at once, in any unit.
         falls_to: The part of the value that is left at the deadline.
         takes: How long it takes once the person has accepted.
-        distance: How near the robot comes [m].
+        distance: Distance at which the robot stops [m].
         manner: Whether it speaks, or only shows a text, which has to be in sight.
         tries: Number of times that the robot addresses the person, at most.
         retry: Time before it tries again.
-        seek: Whether the behavior `interact` looks for the person; else it is an opportunity only.
+        seek: Whether the behavior `interact` looks for the person; else only opportunities count.
 
     Example:
         >>> pill = Interaction(do="remind", to="ana", at=["08:00"], within="30 min", worth=4)
@@ -99,7 +99,7 @@ class Interaction(Settings):
     seek: bool = True
 
     def model_post_init(self, _: object, /) -> None:
-        """Require one way in which it comes up."""
+        """Require either times or an interval."""
         if bool(self.at) == (self.every is not None):
             raise problem("it comes up by 'at' (times of day) or 'every' (a duration): give one")
         if self.fetch_from is not None and (self.do != "deliver" or self.fetch_from == self.to):
@@ -107,17 +107,17 @@ class Interaction(Settings):
 
     @property
     def people(self) -> list[str]:
-        """The persons whom the robot addresses for it, in order."""
+        """The people whom the robot addresses, in order."""
         return [self.to] if self.fetch_from is None else [self.fetch_from, self.to]
 
     def value_after(self, age: timedelta) -> float:
-        """Return its value when it is carried out some time after it came up; 0 if too late."""
+        """Return the value of a request carried out at some age; 0 if too late."""
         if not timedelta(0) <= age <= self.within:
             return 0.0
         return self.worth * (1 - (1 - self.falls_to) * (age / self.within))
 
     def times(self, start: datetime, after: datetime) -> Iterator[datetime]:
-        """Yield when requests come up from a moment on.
+        """Yield the times at which requests come up from a moment on.
 
         Args:
             start: The start of the run.
@@ -139,13 +139,13 @@ class Interaction(Settings):
 
 @dataclass
 class Request:
-    """One time that an interaction is wanted.
+    """One request of an interaction.
 
     Attributes:
         name: The interaction's name in the scenario.
         interaction: The interaction.
         since: When it came up.
-        not_before: When the robot may try (again).
+        not_before: Time from which the robot may try (again).
         tries: Number of times that the person was addressed.
         is_fetched: Whether the robot has what it delivers.
     """
@@ -165,7 +165,7 @@ class Request:
 
     @property
     def is_last_stage(self) -> bool:
-        """Whether it is done once that person accepts."""
+        """Whether the request is done once that person accepts."""
         return self.to == self.interaction.to
 
     @property
@@ -193,13 +193,13 @@ class RequestChange(NamedTuple):
 
 @dataclass
 class RequestQueue:
-    """What a robot wants of people at present.
+    """The requests of a robot to people at present.
 
     Attributes:
         interactions: Its interactions, by name.
         start: The start of the run.
         open: The open requests, in the order in which they came up.
-        opportunities: What it considered, for the events: step and text.
+        opportunities: Opportunities that the robot considered, for the events: step and text.
     """
 
     interactions: Mapping[str, Interaction]
@@ -214,13 +214,13 @@ class RequestQueue:
         }
 
     def take_opportunities(self) -> list[tuple[int, str]]:
-        """Return and remove what was considered."""
+        """Return and remove the opportunities."""
         taken = self.opportunities
         self.opportunities = []
         return taken
 
     def next_changes(self) -> dict[str, datetime]:
-        """Return when a request comes up next (`due`), and a deadline passes (`expired`)."""
+        """Return the next times at which a request comes up (`due`) and one `expired`."""
         if not self._next:
             return {}
         until = [request.until for request in self.open]
@@ -228,7 +228,7 @@ class RequestQueue:
         return {EventKind.DUE: min(self._next.values()), EventKind.EXPIRED: min(until)}
 
     def advance(self, time: datetime) -> list[RequestChange]:
-        """Open what has come up by a time, drop what is too late; return what has changed."""
+        """Open requests that have come up by a time, drop expired ones; return the changes."""
         came_up = []
         for name, due in self._next.items():
             each = self.interactions[name]
@@ -255,7 +255,7 @@ class RequestQueue:
 
         Args:
             time: The present time.
-            people: Only those to these people.
+            people: The people to whom requests are returned.
         """
         ready = [request for request in self.open if request.not_before <= time]
         if people is not None:
@@ -263,12 +263,12 @@ class RequestQueue:
         return sorted(ready, key=lambda each: (-each.interaction.worth, each.until, each.name))
 
     def next_ready(self, time: datetime) -> datetime | None:
-        """Return when a request that has to wait may be tried again; None: none has to."""
+        """Return the time at which a waiting request may be tried again; None: none waits."""
         times = (request.not_before for request in self.open)
         return min((at for at in times if at > time), default=None)
 
     def reopen(self, request: Request, time: datetime) -> None:
-        """Want again what was accepted, as it wasn't carried out, unless it is too late."""
+        """Reopen an accepted request that wasn't carried out, unless it is too late."""
         if request.is_fetched and any(each is request for each in self.open):
             request.is_fetched = False
         elif request.until > time:
@@ -276,13 +276,13 @@ class RequestQueue:
             self.open = sorted([*self.open, request], key=lambda each: (each.since, each.name))
 
     def settle(self, request: Request, outcome: Outcome, time: datetime, later: datetime) -> None:
-        """Note what came of addressing the person.
+        """Note the outcome of addressing the person.
 
         Args:
             request: The request.
-            outcome: What the robot saw.
+            outcome: The outcome that the robot saw.
             time: The present time.
-            later: When the person wants to be asked again, if it was deferred.
+            later: Time at which the person wants to be asked again, if deferred.
         """
         if outcome == Outcome.ACCEPTED and not request.is_last_stage:
             request.is_fetched = True

@@ -1,1 +1,1 @@
-"""What robots see: cameras, and the region that is visible from a place."""
+"""Sight of robots: cameras, and the region that is visible from a place."""

@@ -17,9 +17,10 @@ from fleet2d.runtime.determinism import sum_in_order
 from fleet2d.sight.perception import UNKNOWN, Curve, check_shares, cumulative
 from fleet2d.sight.perception_error import CameraSightings, PerceptionError
 
-# How tall a user of a kind is [m].
+# The heights of kinds of users [m].
 HEIGHTS = {"cat": 0.25, "dog": 0.5, "big_dog": 0.75}
-# How often somebody of a height [m] is taken for a person. Not measured: detectors differ widely.
+# The share of looks in which somebody of a height [m] is taken for a person. This isn't measured,
+# since detectors differ widely.
 BY_HEIGHT = Curve(points=((0.2, 0.01), (0.5, 0.03), (0.8, 0.1), (1.1, 0.3)))
 
 
@@ -27,10 +28,10 @@ class Miscalibration(PerceptionError):
     """A camera that isn't mounted or calibrated as the robot assumes: the same error in each look.
 
     Attributes:
-        yaw_deg: Angle by which all that it perceives is turned round it, counter-clockwise, with
-            the headings of people; rounded to 1/8192 of a turn.
+        yaw_deg: Angle by which all perceived positions are turned round the camera,
+            counter-clockwise, with the headings of people; rounded to 1/8192 of a turn.
         scale: Factor of all distances.
-        offset: What is added to all distances [m].
+        offset: Length added to all distances [m].
     """
 
     yaw_deg: AngleDeg = Field(default=0.0, ge=-180, le=180)
@@ -70,11 +71,11 @@ class Confusable(Settings):
     """How often a user is taken for others. Short form: a number is the rate.
 
     Attributes:
-        rate: Share of sightings in which it is taken for somebody else; left out: by its height.
-        kind: What it is: its height is that of its kind.
-        height: How tall it is [m].
-        others: The shares of those that it is taken for, `unknown` among them; left out: all
-            users without an entry equally.
+        rate: Share of sightings in which the user is taken for somebody else; left out: by height.
+        kind: The kind of user, which sets the height.
+        height: The height of the user [m].
+        others: The shares of users that it is taken for, `unknown` among them; left out: all users
+            without an entry equally.
     """
 
     short_form = ("rate", (str, int, float))
@@ -101,7 +102,7 @@ class Confusable(Settings):
 
     @property
     def share(self) -> float:
-        """The share of sightings in which it is taken for somebody else."""
+        """The share of sightings in which the user is taken for somebody else."""
         if self.rate is not None:
             return self.rate
         height = HEIGHTS[self.kind] if self.kind is not None else self.height
@@ -112,7 +113,7 @@ class TakenFor(PerceptionError):
     """Some users, such as pets, are taken for others at times, each at a rate of its own.
 
     Attributes:
-        users: The users that are taken for others, by name: a rate, or how tall each is.
+        users: The users that are taken for others, by name: a rate, or a kind or height.
         lasts: How long somebody is taken for another, rounded to steps, in intervals from the start
             of the run; 0: each look by itself.
     """
@@ -146,7 +147,7 @@ class TakenFor(PerceptionError):
     def _choices(
         self, sightings: CameraSightings, confusable: Confusable
     ) -> tuple[list[int], list[int]]:
-        """Return the numbers of those that somebody is taken for, and cumulative weights."""
+        """Return the numbers of users that somebody is taken for, and cumulative weights."""
         rest = [user for user in sightings.users if user not in self.users] or [UNKNOWN]
         others = confusable.others or dict.fromkeys(rest, 1.0)
         total = sum_in_order(others.values())

@@ -1,4 +1,4 @@
-"""Methods of sight that remember: regions as polygons, and the cells in view of each pose."""
+"""Methods of sight with a cache: regions as polygons, and the cells in view of each pose."""
 
 from collections import OrderedDict
 from typing import Literal, NamedTuple
@@ -11,9 +11,9 @@ from fleet2d.floorplan.home import Home
 from fleet2d.kernels import I32, I64, SUB, TURN, U8, Bool, Mesh, Reach
 from fleet2d.sight.fov import FieldOfView, Pieces
 
-# Memory for the poses of a flashlight; the least recently used go first.
+# Memory for the poses of a flashlight [bytes]; the least recently used are dropped first.
 MEMORY_BYTES = 64e6
-# Memory of an entry besides its bits: keys, tuple and array.
+# Memory of an entry besides its bits, for keys, tuple and array [bytes].
 ENTRY_BYTES = 450
 
 
@@ -33,7 +33,7 @@ class Regions(NamedTuple):
     wall: I32
 
     def of_cell(self, row: int, column: int) -> Pieces | None:
-        """Return the region of a cell; None if it isn't free, or not in the grid."""
+        """Return the region of a cell; None for one that isn't free or is outside of the grid."""
         rows, columns = self.number.shape
         if not (0 <= row < rows and 0 <= column < columns) or self.number[row, column] < 0:
             return None
@@ -45,12 +45,12 @@ class Regions(NamedTuple):
 class VisibilityPolygon(FieldOfView):
     """Compute the region visible from a place once, then look points up in it.
 
-    It is worthwhile where many points are tested from few places. A region takes 8 bytes a piece,
+    This pays off where many points are tested from few places. A region takes 8 bytes a piece,
     about 200 bytes in a smooth plan and 1 kB in one traced from a sensor.
 
     Attributes:
-        precompute: The regions to compute: `visited`: of the places that cameras look from; `all`:
-            also of the centres of all cells, before the run.
+        precompute: The places whose regions are computed: `visited`, those that cameras look from;
+            `all`, also the centres of all cells, before the run.
         keep: Number of visited places whose regions are cached.
     """
 
@@ -117,8 +117,8 @@ class CellBits(NamedTuple):
 class Flashlight(FieldOfView):
     """Cache the set of cells in view of each pose, and look points up by their cell.
 
-    A point is in view if the centre of its cell is, so it is exact for the centres of cells, and
-    up to half a cell elsewhere. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
+    A point is in view if the centre of its cell is, so results are exact for the centres of cells,
+    and to half a cell elsewhere. A pose takes 1 to 2 kB with a range of 4.5 m and cells of 5 cm.
     """
 
     def visible(self, home: Home, x: int, y: int, points: I64) -> Bool:

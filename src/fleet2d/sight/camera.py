@@ -29,10 +29,10 @@ from fleet2d.sight.perception import Attributes, Detection, FalsePositives, Iden
 # Squares of distances in lattice units stay far inside 64 bits.
 MAX_DISTANCE_M = 10_000
 MAX_POINTS = 32
-# The view of a camera that a scenario doesn't describe: nearest and farthest distance, and width.
+# By default, a camera sees within these distances and this width.
 DEFAULT_RANGE_M = (0.0, 4.5)
 DEFAULT_ANGLE_DEG = 108.0
-# A user not noticed for this long is lost, where a camera doesn't say otherwise.
+# By default, a user not noticed for this long is lost.
 DEFAULT_PATIENCE = timedelta(seconds=5)
 
 
@@ -69,7 +69,7 @@ class Lens(NamedTuple):
 
     @property
     def is_moved(self) -> bool:
-        """Whether it isn't at the centre, or doesn't look along the body's heading."""
+        """Whether the camera isn't at the centre or doesn't look along the body's heading."""
         return bool(self.forward or self.left or self.heading or self.pans)
 
     def body(self, radius: float) -> list[tuple[int, int]]:
@@ -100,9 +100,9 @@ class Camera(Settings):
         lost_after: A user not noticed for this long counts as lost (event user_lost): a multiple of
             the step; left out: 5 s, or the next multiple above; with several cameras, the longest
             counts.
-        offset: Where it is mounted: forward and left of the body's centre [m].
-        height: How high it is mounted [m], for `sight.heights`; left out: 15/16 of the body's
-            height. The camera of a user who sits or lies is lower in proportion.
+        offset: The place where it is mounted: forward and left of the body's centre [m].
+        height: Its height [m], for `sight.heights`; left out: 15/16 of the body's height. The
+            camera of a user who sits or lies is lower in proportion.
         heading_deg: The direction in which it looks, counter-clockwise from the body's heading.
         pan: The directions between which it turns; null: its direction is fixed.
         period: Time from look to look; null: one in every step.
@@ -110,7 +110,7 @@ class Camera(Settings):
         body_points: Points on a circle of a user's radius that are looked at besides the centre:
             one in view is enough; 0: only the centre counts.
         perception: Its errors; null: the robot's `perception`.
-        fails: When it sees nothing, as it fails; null: never.
+        fails: Its failures, during which it sees nothing; null: none.
     """
 
     range: tuple[Length, Length] = Field(default=DEFAULT_RANGE_M, examples=[[0.3, 4.5]])
@@ -166,7 +166,7 @@ class Camera(Settings):
         return Lens(
             near=near,
             far=far,
-            # At 0, both borders are one line, and what lies right behind is on it, too.
+            # At 0, both borders are one line, on which points right behind the camera lie, too.
             half_angle=max(1, round(self.angle_deg / 360 * TURN)),
             chance=round(self.detection * 2**53),
             patience=-(-lost_us // step_us),
@@ -239,7 +239,7 @@ def stack_lenses(lenses: Sequence[Lens], errs: Sequence[bool], context: TableCon
     )
 
 
-# What Lenses have as their cameras have it.
+# Lenses take these fields from each Lens as they are.
 _SAME = (set(Lens._fields) & set(Lenses._fields)) - {"pans"}
 
 
@@ -343,7 +343,7 @@ def _fill_identity(table: I64, confusion: I64, model: Identity, context: TableCo
 
 
 def _whole_sums(shares: Mapping[str, float], order: Sequence[str]) -> list[int]:
-    """Return cumulative probabilities, 1 from the last possible outcome on, despite rounding."""
+    """Return cumulative probabilities: 1 at the last possible outcome, despite rounding."""
     possible = [number for number, name in enumerate(order) if shares.get(name)]
     last = max(possible, default=len(order))
     return perception.cumulative(shares, order)[:last] + [ONE] * (len(order) - last)
@@ -383,7 +383,7 @@ def _fill_false_positives(
             f"{context.path}: perception.false_positives: {sum_in_order(rates):g} per hour exceeds"
             f" the limit of one per look ({float(1 / hours):g} per hour at this period)"
         )
-    # A sum of Poisson processes is one, whose points belong to each by its share of the rate.
+    # A sum of Poisson processes is one, too; each source has its share of the points by its rate.
     term = perception.decay(mean)
     total = 0.0
     for count in range(kernels.MAX_GHOSTS):
@@ -400,7 +400,7 @@ def _fill_false_positives(
 
 
 def is_perfect(errors: Perception | None) -> bool:
-    """Return whether a look has no errors, so that it needs no tables; `errors` come after it."""
+    """Return whether a look has no errors, and so needs no tables; `errors` act afterwards."""
     if errors is None:
         return True
     lit = errors.detection.model_copy(update={"unlit": Detection().unlit})
@@ -411,7 +411,7 @@ class FalseSighting(NamedTuple):
     """A false positive in every look of a camera.
 
     Attributes:
-        user: Name of the user it is recognized as; empty for an unknown person.
+        user: Name of the recognized user; empty for an unknown person.
         x: Position [m].
         y: Position [m].
         heading: Heading [1/4096 turn].
@@ -433,7 +433,8 @@ class Disturbance:
         detection: Factor of the probability that a user in view is noticed.
         errs: The errors that replace the camera's own; None: no change.
         missed: Name of a user who isn't noticed; None: no change.
-        mistaken: Name of a user, and the name it is recognized as, empty for an unknown person.
+        mistaken: Name of a user, and the name under which it is recognized, empty for an unknown
+            person.
         injected: A false positive in every look.
     """
 
@@ -446,12 +447,12 @@ class Disturbance:
     injected: FalseSighting | None = None
 
     def is_of(self, camera: str) -> bool:
-        """Return whether it disturbs a camera."""
+        """Return whether a camera is disturbed."""
         return self.camera in (None, camera)
 
 
 def dark_cameras(names: Collection[str], disturbances: Iterable[Disturbance]) -> set[str]:
-    """Return those of some cameras that see nothing at all because of disturbances."""
+    """Return the cameras that see nothing at all because of disturbances."""
     darkness = (disturbance for disturbance in disturbances if disturbance.dark)
     return {name for each in darkness for name in names if each.is_of(name)}
 
@@ -462,11 +463,10 @@ class SightSettings(Settings):
     Attributes:
         method: Method that decides whether somebody is in view: line_of_sight, visibility_polygon,
             flashlight, or your own.
-        people_occlude: Whether bodies hide people from cameras: a line of sight ends at any body
-            that it passes nearer than that body's radius.
+        people_occlude: Whether bodies hide people from cameras: a body blocks each line of sight
+            that passes within its radius.
         heights: Whether the heights of cameras, bodies and furniture matter: low furniture hides
-            what is lower from where the camera is, and bodies, if they hide people, those behind
-            them as far as they are high.
+            only the lower parts of what is behind it, and so do bodies, if they hide people.
         seen_every: How often the area in view is computed, for the layers of what robots have seen
             and the exposure of rooms; null: in every step.
     """

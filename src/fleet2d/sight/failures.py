@@ -1,4 +1,4 @@
-"""Failures: when a camera, a sensor or a robot fails, at given moments or at random."""
+"""Failures of a camera, a sensor or a robot, at given moments or at random."""
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
@@ -35,11 +35,11 @@ def _as_list(value: Any) -> Any:
 
 
 class Failures(Settings):
-    """When something fails, and for how long: at given moments, at random, or both.
+    """The times at which something fails: given moments, random ones, or both.
 
     Attributes:
         at: The moments: a local time, or the time since the start; one, or a list.
-        per_day: How often it fails a day besides, on average, at any time of it.
+        per_day: Mean number of further failures a day, at random times.
         lasts: How long a failure lasts.
 
     Example:
@@ -75,7 +75,7 @@ def _step_of(moment: datetime | timedelta, clock: Clock) -> int:
     """Return the step of a moment.
 
     Raises:
-        ScenarioError: It isn't within the run.
+        ScenarioError: The moment isn't within the run.
     """
     elapsed_us = micros(moment) if isinstance(moment, timedelta) else clock.elapsed(moment)
     step = clock.step_at_or_after(elapsed_us)
@@ -89,7 +89,7 @@ def _step_of(moment: datetime | timedelta, clock: Clock) -> int:
 
 
 def _random_steps(per_day: float, clock: Clock, key: np.uint64) -> Iterator[int]:
-    """Yield steps drawn for each day of a run, also before its start and after its end."""
+    """Yield random steps for each day of a run, some before its start or after its end."""
     if not per_day:
         return
     for number, midnight in enumerate(midnights(clock.start, clock.time(clock.steps))):

@@ -20,7 +20,7 @@ Pieces = tuple[I32, I32]
 
 
 class WallPlan(Protocol):
-    """Protocol of plans with walls, as lines of sight need them: such as a floor plan."""
+    """Protocol of anything with walls for lines of sight, such as a floor plan."""
 
     @property
     def sight_mesh(self) -> Mesh:
@@ -92,7 +92,7 @@ class VisibleRegion:
         """Return which points are visible.
 
         Args:
-            points: (…, 2) [m]; each counts as the nearest lattice point.
+            points: (…, 2) [m]; each is rounded to the nearest lattice point.
 
         Returns:
             bool (…).

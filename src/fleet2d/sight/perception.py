@@ -1,4 +1,4 @@
-"""Perception: the errors of what a robot perceives in the images of its cameras.
+"""Perception: the errors of a robot in reading the images of its cameras.
 
 Probabilities may depend on a distance, an angle or the time of day: they are curves, which are
 equal on every machine. Every part is perfect unless the scenario configures an error.
@@ -29,7 +29,7 @@ LN_2 = int(Decimal(2).ln() * 2**32) / 2**32
 LN_2_REST = float(Decimal(2).ln() - Decimal(LN_2))
 TERMS = 15  # of the series of exp, up to half of LN_2: more than the precision of a double needs
 
-# Largest deviation from 1 of a sum of shares, such as of 1/3 written in decimals.
+# A sum of shares may deviate from 1 by this much, as decimals of 1/3 do.
 SUM_ERROR = 1e-6
 UNKNOWN = "unknown"
 
@@ -180,8 +180,8 @@ ALWAYS = Curve(points=((0.0, 1.0),))
 NEVER = Curve(points=((0.0, 0.0),))
 
 
-# How well people are noticed without a light: by daylight as ever, at night a fifth as often. Not
-# measured: cameras differ widely here.
+# Without a light, people are noticed by daylight as ever, at night a fifth as often. This isn't
+# measured, since cameras differ widely here.
 DARKEST = 0.2
 DARK_NIGHT = Curve(points=((6.0, DARKEST), (8.0, 1.0), (17.0, 1.0), (19.0, DARKEST)))
 
@@ -189,7 +189,7 @@ DARK_NIGHT = Curve(points=((6.0, DARKEST), (8.0, 1.0), (17.0, 1.0), (19.0, DARKE
 def check_shares(
     location: tuple[str, ...], shares: Mapping[Any, float], own: object = None, *, whole: bool
 ) -> None:
-    """Refuse shares that have one of `own`, or exceed 1 together; if `whole`, they must be 1."""
+    """Refuse shares of one of `own`, or whose sum exceeds 1 or, if `whole`, isn't 1."""
     if own in shares:
         raise problem_at(location, f"{own!r} can't be mistaken for itself: leave it out")
     total = sum_in_order(shares.values())
@@ -214,8 +214,8 @@ class Detection(Settings):
         light: Factor by the time of day [hours], the same every day.
         unlit: Further factor, by the time of day, where the light of the user's room is off; left
             out: by the sun, if the scenario has `simulation.daylight`.
-        memory: Time constant of misses: after it, the last random draw still holds with probability
-            1/e; 0: each look has a new draw.
+        memory: Time constant of misses, after which the last random draw still holds with
+            probability 1/e; 0: each look has a new draw.
     """
 
     distance: Curve = ALWAYS
@@ -240,7 +240,7 @@ class MistakenSpot(Settings):
     """A place that is sometimes mistaken for a person: a coat rack, a screen, a mirror.
 
     Attributes:
-        at: Where it is [m].
+        at: Its position [m].
         per_hour: False positives per hour in which it is in view.
         spread: Standard deviation of their positions, per axis [m].
     """
@@ -272,7 +272,7 @@ class Identity(Settings):
     """Identity of a noticed user: recognized, mistaken for another user, or not recognized.
 
     Attributes:
-        right: Probability of being recognized, by distance [m]; null: whenever not mistaken.
+        right: Probability of being recognized, by distance [m]; null: 1 minus that of mistakes.
         mistaken: Probability of being mistaken for another user, by distance [m]; the rest is
             unknown.
         confusion: For each user, the shares of users that it is mistaken for; left out: all others
@@ -333,7 +333,7 @@ class Perception(Settings):
         false_positives: Rates of people that are perceived but aren't there.
         identity: Recognition of users.
         attributes: Errors of position, heading, posture and activity.
-        errors: Further errors by name, built in or your own; they act after the others, in the
+        errors: Further errors by name, built in or your own, which act after the others, in the
             order of their names.
     """
 

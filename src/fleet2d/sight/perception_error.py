@@ -44,7 +44,7 @@ class ErrorStream:
     name: str
 
     def key(self, purpose: str, person: str = "") -> np.uint64:
-        """Return the key of the stream for a purpose, and a person where it is about one."""
+        """Return the key of the stream for a purpose, and for a person if given."""
         return stream_key(self.seed, self.path, f"{self.name}: {purpose}: {person}")
 
 
@@ -62,20 +62,20 @@ class CameraSightings:
         start: Local time of step 0.
         step_s: Length of a step [s].
         step: Step of the look: int64 (n,).
-        user: Who it seems to be, -1 if not recognized: int64 (n,).
+        user: The recognized user, -1 if not recognized: int64 (n,).
         x: Perceived position [m]: float64 (n,).
         y: Perceived position [m]: float64 (n,).
         heading: Perceived heading [rad]: float64 (n,).
         posture: Perceived posture, 0 stands, 1 sits, 2 lies: int64 (n,).
-        noticed: Whether it is noticed at all, true at first: bool (n,).
-        true_user: Who it is, -1 for a false positive: int64 (n,).
+        noticed: Whether the person is noticed at all, true at first: bool (n,).
+        true_user: The true user, -1 for a false positive: int64 (n,).
         true_x: True position [m]: float64 (n,).
         true_y: True position [m]: float64 (n,).
         true_heading: True heading [rad]: float64 (n,).
         true_posture: True posture: int64 (n,).
-        camera_x: Where the camera is [m]: float64 (n,).
-        camera_y: Where the camera is [m]: float64 (n,).
-        camera_heading: Where it looks [rad]: float64 (n,).
+        camera_x: Position of the camera [m]: float64 (n,).
+        camera_y: Position of the camera [m]: float64 (n,).
+        camera_heading: Heading of the camera [rad]: float64 (n,).
     """
 
     camera: str
@@ -139,7 +139,7 @@ class CameraSightings:
         user: ArrayLike | None = None,
         noticed: ArrayLike | None = None,
     ) -> "CameraSightings":
-        """Return the sightings with other values: for each an array (n,), or one value for all.
+        """Return the sightings with other values: arrays (n,), or one value for all sightings.
 
         Stored values are rounded: positions to the lattice of the home, headings to 1/4096 turn.
 
@@ -148,8 +148,8 @@ class CameraSightings:
             y: Perceived position [m].
             heading: Perceived heading [rad], any number of turns.
             posture: Perceived posture: 0, 1 or 2.
-            user: Who it seems to be; -1: not recognized.
-            noticed: Whether it is noticed.
+            user: The recognized user; -1: not recognized.
+            noticed: Whether the person is noticed.
 
         Raises:
             ComponentError: A value has another shape, isn't finite, or is out of bounds.
@@ -177,7 +177,7 @@ class CameraSightings:
             turn_deg: Angle by which they are turned round the camera, counter-clockwise, rounded to
                 1/8192 turn (0.044 degrees).
             scale: Factor of the distance.
-            offset: What is added to the distance [m]; the sum is at least 0.
+            offset: Length added to the distance [m]; the sum is at least 0.
 
         Raises:
             ComponentError: A value has another shape, isn't finite, or moves them out of bounds.
@@ -204,9 +204,9 @@ class CameraSightings:
         Equal arguments give equal numbers; each purpose, person, camera and error has its own.
 
         Args:
-            purpose: What is drawn.
-            at: What the numbers depend on besides, (n,) or one for all, rounded down; None: the
-                step. `step // 60` gives all sightings of a person in sixty steps the same number.
+            purpose: The quantity that is drawn.
+            at: A further address of the numbers, (n,) or one for all, rounded down; None: the step.
+                `step // 60` gives all sightings of a person in sixty steps the same number.
             shared: Whether all people have the same numbers.
         """
         return self._draw(kernels.random_shares, purpose, at, shared) / ONE
@@ -214,7 +214,7 @@ class CameraSightings:
     def bell(self, purpose: str, *, at: ArrayLike | None = None, shared: bool = False) -> F64:
         """Return bell-shaped random numbers, mean 0, standard deviation 1: float64 (n,).
 
-        They are cut at 4.88; arguments are those of `uniform`.
+        The numbers are cut at 4.88; the arguments are those of `uniform`.
         """
         return self._draw(kernels.random_bells, purpose, at, shared) / BELL_STD
 
@@ -229,7 +229,7 @@ class CameraSightings:
             rows = np.flatnonzero(self.true_user == person)
             name = FALSE_POSITIVE
             addresses = steps[rows]
-            if person == NOBODY:  # a look may have several
+            if person == NOBODY:  # a look may have several false positives
                 first = np.searchsorted(self.step[rows], self.step[rows])
                 addresses = addresses * MAX_DRAWS_PER_LOOK + (np.arange(len(rows)) - first)
             else:
@@ -241,7 +241,7 @@ class CameraSightings:
         """Return an array (n,) of a value.
 
         Raises:
-            ComponentError: It has another shape or type.
+            ComponentError: The value has another shape or type.
         """
         array = np.asarray(value)
         if array.shape not in ((), (len(self),)):
@@ -275,11 +275,11 @@ class CameraSightings:
 
 
 class PerceptionError(Component):
-    """Base of errors of perception; a subclass writes `distort`. It is no exception.
+    """Base of errors of perception, which are no exceptions; a subclass writes `distort`.
 
     An error acts on the sightings of one camera. It may use the sightings and their draws only, and
-    treats each by itself: a call has any number of looks, and looks may be computed twice. So it
-    keeps no state.
+    treats each by itself, without state: a call has any number of looks, and looks may be computed
+    twice.
 
     Example:
         >>> import numpy as np
@@ -309,7 +309,7 @@ class PerceptionError(Component):
         """Return the sightings with this error: `sightings.replace(…)`, or `sightings.moved(…)`.
 
         Args:
-            sightings: What a camera perceived in some looks, with the errors that come before.
+            sightings: The perceptions of a camera in some looks, with the errors that come before.
         """
 
     def __setattr__(self, name: str, value: Any) -> None:
