@@ -1,4 +1,4 @@
-"""What the trials of tests say: a question, two to six sentences, and one small table."""
+"""The answer of trials: a question, two to six sentences, and one small table."""
 
 from collections.abc import Iterator, Sequence
 from datetime import timedelta
@@ -22,13 +22,13 @@ from fleet2d.testing.suite import TrialReport
 from fleet2d.testing.trials import ASSERT, TEST, margin_text
 
 RATES = (0.9, 0.95, 0.99, 0.999)
-"""Rates of which the next one is told with the number of trials that would show it."""
+"""Rates, of which the next higher one is told with the number of trials that show it."""
 MAX_TIMES = 50
-"""How many times as many trials are tried to show a difference."""
+"""The largest multiple of the trials that is considered to show a difference."""
 
 
 def answer(gate: Gate) -> Conclusion:
-    """Return what a gate says of its build."""
+    """Return the answer of a gate about its build."""
     ordered = sorted(gate.tallies, key=lambda each: _rank(gate, each))
     question = "Does the robot do what its tests expect?"
     if gate.build:
@@ -74,7 +74,7 @@ def headline(gate: Gate) -> str:
 
 
 def cost_of(reports: Sequence[TrialReport], wall_s: float, builds: int = 1) -> str:
-    """Return how many trials were run, and what they took."""
+    """Return a sentence with the number of trials and the time that they took."""
     if not reports:
         return ""
     simulated = in_words(timedelta(seconds=sum(report.simulated_s for report in reports)))
@@ -85,7 +85,7 @@ def cost_of(reports: Sequence[TrialReport], wall_s: float, builds: int = 1) -> s
 
 
 def _rank(gate: Gate, each: Tally) -> tuple[bool, bool, int, float]:
-    """Return what sorts expectations: first what speaks against the build, the most often."""
+    """Return the sort key of an expectation: first those against the build that fail most often."""
     share = len(each.failed) / max(1, each.trials)
     is_harmless = each not in gate.blocking
     is_unknown = each not in gate.known
@@ -93,7 +93,7 @@ def _rank(gate: Gate, each: Tally) -> tuple[bool, bool, int, float]:
 
 
 def _name(gate: Gate, each: Tally) -> str:
-    """Return an expectation with its test, if there are several, and with what it covers."""
+    """Return the name of an expectation, with its test if there are several, and requirements."""
     test = gate.short[each.test]
     if each.name in ("", TEST):
         return test
@@ -195,14 +195,14 @@ def _units(each: Tally) -> int:
 
 
 def _least_shown(each: Tally) -> float:
-    """Return the largest share of trials that an accepted claim can't tell from what it claims."""
+    """Return the highest rate that an accepted claim excludes, as a share of the claimed one."""
     claim = each.claim
     assert claim is not None, "only what was judged is compared"
     return ERROR ** (1 / _units(each)) if claim.holds == 1 else claim.alternative / claim.holds
 
 
 def _missed(gate: Gate) -> str:
-    """Return which failures the fewest trials that held may have missed, and how many more show."""
+    """Return how rare a failure the fewest trials may have missed, and how many more show it."""
     held = [each for each in gate.tallies if each.verdict == HELD and each.claim is not None]
     if not held:
         return ""

@@ -128,7 +128,7 @@ def test(  # noqa: PLR0913 - options of the command line
 
 @dataclass
 class _Suite:
-    """The tests of a command, what they are run with, and what came of it."""
+    """The tests of a command, the options of their trials, and the reports."""
 
     tests: "list[SuiteTest]"
     notes: list[str]
@@ -226,7 +226,7 @@ class _Suite:
                 self.history.add(build.name, self.prints, reports)
 
     def gate(self) -> "Gate":
-        """Return what the trials show."""
+        """Return the gate of the trials."""
         from fleet2d.testing.answer import cost_of
         from fleet2d.testing.gate import Gate, compare, cover, tally
 
@@ -289,7 +289,7 @@ class _Suite:
             from fleet2d.viewing.figures import draw_failure
 
             draw_failure(open_run(directory), outcome.step, picture, outcome.says, evidence)  # type: ignore[arg-type]
-        except Fleet2DError as error:  # such as that matplotlib is not installed
+        except Fleet2DError as error:  # matplotlib may be missing
             self.notes.append(f"{picture.name} was not drawn: {error}")
             return
         self.files[key].append(picture)
@@ -310,7 +310,7 @@ class _Suite:
         if out is not None and key in self.files:
             return f"see it: fleet2d show {self.files[key][0]}{at}"
         run = test.command(key, self.builds[0], FAILURES)
-        if outcome is None:  # no run is stored of what can't be run
+        if outcome is None:  # a trial that can't be run stores nothing
             return f"again: {run}"
         return f"see it: {run}; fleet2d show {FAILURES}/{run_name(key)}{at}"
 

@@ -188,11 +188,11 @@ def rate_interval(held: int, number: int, error: float = 0.05) -> tuple[float, f
 def nested_rate_interval(
     outcomes: Sequence[Sequence[bool]], error: float = 0.05
 ) -> tuple[float, float]:
-    """Return the interval of rates that trials leave open of which some share a home.
+    """Return the interval of rates that trials leave open, some of which share a home.
 
-    It is that of the effective number of trials, which is the smaller the more homes differ (Korn
-    and Graubard, 1998, Survey Methodology 24); if all trials of several homes had the same outcome,
-    which doesn't tell how much homes differ, it is the number of homes.
+    The interval is that of the effective number of trials, which is the smaller the more homes
+    differ (Korn and Graubard, 1998, Survey Methodology 24). If all trials had the same outcome,
+    which doesn't tell how much homes differ, the number of homes is used.
 
     Args:
         outcomes: Whether each trial held, by home or other variant.
@@ -319,7 +319,7 @@ class Claim:
         holds: The claimed rate.
         error: Largest probability of a wrong decision.
         only: The only seed to run; None: all.
-        width: The largest difference between the claimed rate and the next that is refused.
+        width: The largest difference between the claimed rate and the highest refused one.
         may_be_untested: Whether trials count that test nothing.
         problem: What is wrong with the arguments; empty if nothing is.
     """
@@ -400,7 +400,7 @@ class Claim:
 
     @cached_property
     def variants(self) -> tuple[Variant, ...]:
-        """The checked variants of the scenario along its axes; without axes, it alone."""
+        """The checked variants of the scenario along its axes; without axes, the scenario alone."""
         if not self.varies:
             return (Variant(self.scenario),)
         from fleet2d.studies.design import build_design
@@ -530,6 +530,6 @@ def _homes(folder: Path, homes: int | str | Path | Sequence[str | Path] | None) 
 
 
 def _near(folder: Path, name: str | Path) -> str:
-    """Return a path or pattern relative to a folder, if it exists there, else as it is."""
+    """Return a path or pattern relative to a folder if it exists there, else unchanged."""
     path = folder / name
     return str(path if path.exists() or any(path.parent.glob(path.name)) else Path(name).absolute())

@@ -20,7 +20,7 @@ from fleet2d.storage.files import new_folder
 if TYPE_CHECKING:
     from fleet2d.testing.search import FailingPoint, FailureSearch, SearchSpace, TryJob
 
-UNLIMITED_TRIES = 1_000_000  # if the budget is a time
+UNLIMITED_TRIES = 1_000_000  # for a budget of time
 SHRINK_TRIES = 40
 FAILURE_FOUND = 1
 """The exit code if a run fails, as that of a test."""

@@ -29,7 +29,7 @@ from fleet2d.testing.trials import (
 LEAD_TIMES = tuple(timedelta(minutes=minutes) for minutes in (0, 1, 5, 15, 60, 240, 1440, 10_080))
 """Times from the start of a shorter run to the failure, tried in this order."""
 MAX_SEEDS_SHOWN = 8
-FILM_STEPS = 30  # before and after a failure
+FILM_STEPS = 30  # steps to show before and after a failure
 
 
 class FailingCase(NamedTuple):
@@ -39,7 +39,7 @@ class FailingCase(NamedTuple):
         variant: The scenario.
         without: Numbers of the interventions that are left out.
         result: The result of the run.
-        failure: The failure that it is about.
+        failure: The failure that smaller runs must repeat.
     """
 
     variant: Variant
@@ -60,7 +60,7 @@ class FailingCase(NamedTuple):
 
     @property
     def step(self) -> int:
-        """The step at which it fails."""
+        """The step of the failure."""
         step = self.failure.step
         return max(0, self.result.steps - 1) if step is None else step
 
@@ -68,13 +68,13 @@ class FailingCase(NamedTuple):
 class Shrinker:
     """Tries smaller versions of a failing run.
 
-    A smaller version counts if the same expectation fails in the same way. What didn't come about
-    must have been asked for in it: interventions that name what the expectation names stay. The
-    time before stays, too, while an algorithm learns on which the failure depends.
+    A smaller version counts if the same expectation fails in the same way. Interventions stay that
+    may have asked for what didn't come about, as they share names with the expectation; and so does
+    the time before the failure, while it depends on an algorithm that learns.
     """
 
     def __init__(self, body: Body, tries: int) -> None:
-        """Prepare.
+        """Prepare to shrink runs of a test.
 
         Args:
             body: The test.
@@ -84,39 +84,45 @@ class Shrinker:
         self.tries = tries
 
     def shrink(self, result: TrialResult) -> FailingCase | None:
-        """Return the smallest version that it finds of a failing run; None if there is none."""
+        """Return the smallest version found of a failing run; None if none is smaller."""
         failure = result.first_failure
         if failure is None or failure.untested:
             return None
         whole = case = FailingCase(result.variant, frozenset(), result, failure)
-        for reduce in (self._sooner, self._unlearned, self._later, self._undone, self._fewer):
+        for reduce in (
+            self._cut_after,
+            self._drop_learners,
+            self._cut_before,
+            self._drop_interventions,
+            self._drop_bodies,
+        ):
             case = reduce(case)
-        case = self._sooner(case)
+        case = self._cut_after(case)
         return None if case is whole else case
 
-    def _sooner(self, case: FailingCase) -> FailingCase:
+    def _cut_after(self, case: FailingCase) -> FailingCase:
         """End the run at the failure."""
         simulation = case.variant.scenario.simulation
         if case.step + 1 >= simulation.steps or case.failure.kind == MISSED_BY_THE_END:
             return case
         length = (case.step + 1) * simulation.step
-        return self._within(case, simulation.clock.start, simulation.clock.start + length) or case
+        return self._cut(case, simulation.clock.start, simulation.clock.start + length) or case
 
-    def _unlearned(self, case: FailingCase) -> FailingCase:
+    def _drop_learners(self, case: FailingCase) -> FailingCase:
         """Leave out the algorithms and metrics that aren't needed to fail."""
         without = _edited(case.variant, algorithms={}, metrics={})
         if case.variant.scenario.algorithms and (smaller := self._try(case, without)):
             return smaller
-        return self._left_out(case, ("algorithms", "metrics"))
+        return self._drop_entries(case, ("algorithms", "metrics"))
 
-    def _later(self, case: FailingCase) -> FailingCase:
+    def _cut_before(self, case: FailingCase) -> FailingCase:
         """Move the start of the run as close to the failure as possible, to the minute."""
         if case.variant.scenario.algorithms or case.failure.kind == MISSED_BY_THE_END:
             return case  # what they have learned by then may be the cause
         whole = case
         short = timedelta(0)
         for lead in LEAD_TIMES:
-            if smaller := self._started(whole, lead):
+            if smaller := self._begin_before(whole, lead):
                 case = smaller
                 break
             short = lead
@@ -124,12 +130,12 @@ class Shrinker:
             return case
         while lead - short > timedelta(minutes=1) and self.tries > 0:
             middle = (short + (lead - short) / 2) // timedelta(minutes=1) * timedelta(minutes=1)
-            smaller = self._started(whole, middle)
+            smaller = self._begin_before(whole, middle)
             short, lead = (short, middle) if smaller else (middle, lead)
             case = smaller or case
         return case
 
-    def _started(self, case: FailingCase, lead: timedelta) -> FailingCase | None:
+    def _begin_before(self, case: FailingCase, lead: timedelta) -> FailingCase | None:
         """Return the run that begins some time before the failure, if it fails, too."""
         simulation = case.variant.scenario.simulation
         end = simulation.clock.start + simulation.duration
@@ -137,15 +143,15 @@ class Shrinker:
         start = (failing - lead).replace(second=0, microsecond=0)
         if not simulation.clock.start < start < end:
             return None
-        smaller = self._within(case, start, end)
-        return smaller and self._sooner(smaller)
+        smaller = self._cut(case, start, end)
+        return smaller and self._cut_after(smaller)
 
-    def _within(self, case: FailingCase, start: datetime, end: datetime) -> FailingCase | None:
+    def _cut(self, case: FailingCase, start: datetime, end: datetime) -> FailingCase | None:
         """Return the part of the run between two times, if it fails, too."""
         entries = case.variant.scenario.script
         script = _script_within(case.variant.scenario, start, end)
         if any(
-            content is None and self._is_about(case, names_in(entry.act))
+            content is None and self._may_ask_for(case, names_in(entry.act))
             for entry, content in zip(entries, script, strict=True)
         ):
             return None
@@ -153,28 +159,28 @@ class Shrinker:
         content = {"script": list(filter(None, script))} if entries else {}
         return self._try(case, _edited(case.variant, simulation=times, **content))
 
-    def _undone(self, case: FailingCase) -> FailingCase:
+    def _drop_interventions(self, case: FailingCase) -> FailingCase:
         """Leave out interventions, the last first."""
         for number in reversed(range(len(case.result.acts))):
-            if not self._is_about(case, case.result.acts[number]):
+            if not self._may_ask_for(case, case.result.acts[number]):
                 case = self._try(case, case.variant, case.without | {number}) or case
         for number in reversed(range(len(case.variant.scenario.script))):
             script = case.variant.scenario.resolved()["script"]
-            if not self._is_about(case, names_in(script.pop(number))):
+            if not self._may_ask_for(case, names_in(script.pop(number))):
                 case = self._try(case, _edited(case.variant, script=script)) or case
         return case
 
     @staticmethod
-    def _is_about(case: FailingCase, names: frozenset[str]) -> bool:
-        """Whether an intervention, by its names, may be what asked for that which didn't come."""
+    def _may_ask_for(case: FailingCase, names: frozenset[str]) -> bool:
+        """Return whether an intervention with these names may have asked for what was missed."""
         is_missing = case.failure.kind in (MISSED, MISSED_BY_THE_END)
         return is_missing and bool(case.failure.names & names)
 
-    def _fewer(self, case: FailingCase) -> FailingCase:
+    def _drop_bodies(self, case: FailingCase) -> FailingCase:
         """Leave out the people, robots and objects not needed to fail."""
-        return self._left_out(case, ("robots", "users", "objects"))
+        return self._drop_entries(case, ("robots", "users", "objects"))
 
-    def _left_out(self, case: FailingCase, sections: tuple[str, ...]) -> FailingCase:
+    def _drop_entries(self, case: FailingCase, sections: tuple[str, ...]) -> FailingCase:
         """Leave out the entries of some sections one by one."""
         for section in sections:
             for name in getattr(case.variant.scenario, section):
@@ -200,7 +206,7 @@ class Shrinker:
 
 
 def same_failure(failure: ExpectationResult, result: TrialResult) -> ExpectationResult | None:
-    """Return the failure of a run that is of the same expectation and kind; None if none is."""
+    """Return the failure of a run with the same expectation and kind; None if there is none."""
     same = (f for f in result.failures if (f.name, f.kind) == (failure.name, failure.kind))
     return next(same, None)
 
@@ -208,14 +214,14 @@ def same_failure(failure: ExpectationResult, result: TrialResult) -> Expectation
 def _script_within(
     scenario: Scenario, start: datetime, end: datetime
 ) -> list[dict[str, Any] | None]:
-    """Return the entries of a script for another time; None for those that aren't in it."""
+    """Return the entries of a script for a part of its time; None for those outside."""
     simulation = scenario.simulation
     clock = Clock(start, simulation.step_us, (end - start) // simulation.step)
     entries: list[dict[str, Any] | None] = []
     for entry, content in zip(scenario.script, scenario.resolved()["script"], strict=True):
         at = entry.at
         is_in = True
-        if isinstance(at, timedelta):  # from the start on
+        if isinstance(at, timedelta):  # since the start
             at = at - (start - simulation.clock.start)
             is_in = timedelta(0) <= at < end - start
             content = {**content, "at": at}
@@ -249,7 +255,7 @@ def explain(result: ClaimResult, body: Body, folder: Path, test: str, tries: int
         tries: Largest number of runs to make it smaller.
     """
     folder /= re.sub(r"[^\w.-]+", "-", test).strip("-")
-    shutil.rmtree(folder, ignore_errors=True)  # of earlier failures
+    shutil.rmtree(folder, ignore_errors=True)  # it may hold earlier failures
     folder.mkdir(parents=True, exist_ok=True)
     trial = result.shown
     command = f"pytest {shlex.quote(test)} --fleet2d-seed {trial.variant.seed}"
@@ -341,7 +347,7 @@ def _store(
         text = failure.text.splitlines()[0]
         draw_failure(run, min(step, run.manifest["steps"] - 1), picture, text, failure.evidence)
         yield f"  picture: {picture}"
-    except Fleet2DError as error:  # such as that matplotlib is not installed
+    except Fleet2DError as error:  # matplotlib may be missing
         yield f"  no picture: {error}"
     path = shlex.quote(str(out))
     yield f"  see it: fleet2d view {path}, or fleet2d show {path} --at 'step {step}'"

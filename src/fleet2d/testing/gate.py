@@ -27,14 +27,14 @@ BROKEN = "can't run"
 NOT_COVERED = "not covered"
 NOT_RUN = "not run"
 RANKING = (BROKEN, FAILED, UNTESTED, UNDECIDED, NOT_RUN, HELD)
-"""Verdicts, the worst first: a requirement has that of its worst expectation."""
+"""Verdicts, the worst first: a requirement has the worst of its expectations."""
 Place = tuple[str, str]
 """The names of a test and of an expectation."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tally:
-    """What came of an expectation in all trials of a build.
+    """The outcomes of an expectation in all trials of a build.
 
     Attributes:
         test: The name of the test.
@@ -42,8 +42,8 @@ class Tally:
         outcomes: Its outcomes by trial.
         errors: The trials that couldn't be run, or broke.
         accepted: Whether the claim of its test was accepted; None if trials are too few for that.
-        claim: What its test claims; None if none of its trials could be judged.
-        declared: The requirements that its scenario says it covers.
+        claim: The claim of its test; None if no trial could be judged.
+        declared: The requirements that it covers by its scenario.
     """
 
     test: str
@@ -61,7 +61,7 @@ class Tally:
 
     @property
     def title(self) -> str:
-        """The expectation with its test, and with what it covers."""
+        """The expectation with its test and its requirements."""
         covers = f" ({', '.join(sorted(self.covers))})" if self.covers else ""
         return f"{self.name} of {self.test}{covers}"
 
@@ -83,7 +83,7 @@ class Tally:
 
     @property
     def verdict(self) -> str:
-        """What is to be said of it, as one of `RANKING`."""
+        """The verdict, one of `RANKING`."""
         if self.errors:
             return BROKEN
         if not self.outcomes:
@@ -107,13 +107,13 @@ class Tally:
 
     @property
     def least_margin(self) -> tuple[float, str] | None:
-        """Its lowest margin and the unit of that; None without any."""
+        """Its lowest margin, with the unit; None without margins."""
         outcomes = self.outcomes.values()
         return min(((o.margin, o.unit) for o in outcomes if o.margin is not None), default=None)
 
     @property
     def rate(self) -> tuple[float, float]:
-        """The 95 % interval of the share of trials in which it doesn't fail; (0, 1) without any."""
+        """The 95 % interval of the share of trials without a failure; (0, 1) without trials."""
         by_home: dict[str, list[bool]] = {}
         for key, outcome in self.outcomes.items():
             by_home.setdefault(key.home, []).append(not outcome.fails)
@@ -133,7 +133,7 @@ class Tally:
         }
 
     def sentence(self) -> str:
-        """Return what failed in how many trials, and how in the worst."""
+        """Return a sentence that says in how many trials it failed, and how in the worst."""
         number = counted(self.trials, "trial")
         if self.errors:
             first = self.errors[0]
@@ -151,7 +151,7 @@ class Tally:
 
 
 def _depth(outcome: TrialOutcome) -> tuple[bool, float]:
-    """Return what sorts failures, the worst first: violations before what was untested."""
+    """Return the sort key of failures, the worst first: violations before untested outcomes."""
     return outcome.holds is None, -math.inf if outcome.margin is None else outcome.margin
 
 
@@ -205,15 +205,15 @@ class PairedChange(NamedTuple):
         worse: The trials in which it fails now, and didn't before.
         better: The trials in which it failed before, and doesn't now.
         units: What counts as independent: home, if there are several, or else trial.
-        worse_units: How many units have more trials that are worse than that are better.
-        better_units: The other way round.
+        worse_units: The number of units in which more trials are worse than better.
+        better_units: The number of units in which more trials are better than worse.
         p: Exact two-sided p value of such a difference if builds don't differ (McNemar's test).
         p_holm: The same, corrected for the number of expectations.
         shift: Median change of the margin where it differs [unit]; None if it doesn't.
         unit: Unit of the shift.
-        narrower: How many units have a smaller margin.
-        wider: How many have a larger one.
-        p_shift: p value of that (sign test), corrected for the number of expectations.
+        narrower: The number of units with a smaller margin.
+        wider: The number of units with a larger margin.
+        p_shift: p value of the shift (sign test), corrected for the number of expectations.
     """
 
     test: str
@@ -256,7 +256,7 @@ class PairedChange(NamedTuple):
 
     @property
     def differs(self) -> bool:
-        """Whether any verdict does."""
+        """Whether any verdict differs."""
         return bool(self.worse or self.better)
 
     def content(self) -> dict[str, Any]:
@@ -284,7 +284,7 @@ class PairedChange(NamedTuple):
         return f"{text} (p = {self.p_holm:.2g}{doubt})"
 
     def nearer(self) -> str:
-        """Return by how much less it holds."""
+        """Return in how many units it holds by less, and by how much."""
         number = counted(self.narrower + self.wider, self.units)
         by = amount(-(self.shift or 0.0), self.unit)
         return (
@@ -294,7 +294,7 @@ class PairedChange(NamedTuple):
 
 
 def listed(keys: Sequence[TrialKey]) -> str:
-    """Return the labels of trials, the first few."""
+    """Return the labels of the first few trials."""
     more = [f"and {len(keys) - MAX_LISTED} more"] if len(keys) > MAX_LISTED else []
     return "; ".join([*(key.label for key in keys[:MAX_LISTED]), *more])
 
@@ -381,11 +381,11 @@ def _by_unit(values: Mapping[TrialKey, float], several: bool) -> tuple[int, int]
 
 
 class RequirementCoverage(NamedTuple):
-    """A requirement, and what covers it.
+    """A requirement and the expectations that cover it.
 
     Attributes:
         requirement: Its id.
-        text: What it says; empty if there is no list of requirements.
+        text: Its text; empty if there is no list of requirements.
         verdicts: The verdict of each expectation that covers it.
     """
 
@@ -395,7 +395,7 @@ class RequirementCoverage(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """The worst of them; or that there are none."""
+        """The worst of the verdicts, or `NOT_COVERED`."""
         return min(self.verdicts.values(), key=RANKING.index, default=NOT_COVERED)
 
     def content(self) -> dict[str, Any]:
@@ -426,7 +426,7 @@ def cover(
     """Return the coverage of requirements by the expectations of tests.
 
     Raises:
-        InputError: An expectation covers a requirement that isn't among them.
+        InputError: An expectation covers a requirement that isn't listed.
     """
     rows: dict[str, dict[Place, str]] = {name: {} for name in requirements or ()}
     for each in tallies:
@@ -443,7 +443,7 @@ def cover(
 
 @dataclass(frozen=True)
 class Gate:
-    """All that is known about a build when it is to be released.
+    """All that trials tell about a build before its release.
 
     Attributes:
         build: The name of the build; empty if it has none.
@@ -451,10 +451,10 @@ class Gate:
         against: The name of the build that it is compared with; empty for none.
         before: The tallies of that build.
         changes: How expectations differ between both.
-        coverage: The requirements and what covers them.
-        trend: By build of the history, oldest first: how often each expectation held, of how many.
-        notes: What was left out, and the like.
-        cost: How many trials were run, and what they took.
+        coverage: The requirements and the expectations that cover them.
+        trend: How often each expectation held, of how many trials, by build; the oldest first.
+        notes: Remarks, such as on tests that were left out.
+        cost: A sentence with the number of trials and the time that they took.
         expected: The tests that are expected to fail.
     """
 
@@ -485,10 +485,10 @@ class Gate:
 
     @cached_property
     def blocking(self) -> list[Tally]:
-        """What speaks against a release.
+        """The expectations that speak against a release.
 
-        Without another build that is all that fails unexpectedly; else what is clearly worse, what
-        fails and didn't, and what can't be run.
+        Without another build these are all that fail unexpectedly; else those that are clearly
+        worse, that fail only now, or that can't be run.
         """
         failing = {each.place for each in self.before if each.fails}
         found = []
@@ -503,12 +503,12 @@ class Gate:
 
     @cached_property
     def known(self) -> list[Tally]:
-        """What fails with both builds and isn't clearly worse, or is expected to fail."""
+        """The expectations that fail with both builds, not clearly worse, or as expected."""
         return [each for each in self.tallies if each.fails and each not in self.blocking]
 
     @property
     def known_as(self) -> str:
-        """Why that doesn't speak against a release."""
+        """Why known failures don't speak against a release, in words."""
         return f"fails with {self.against}, too" if self.against else "fails as expected"
 
     @property
@@ -517,7 +517,7 @@ class Gate:
         return not self.blocking
 
     def details(self, hints: Mapping[Tally, str]) -> Iterator[str]:
-        """Yield what failed and how, and how to see it."""
+        """Yield lines that say what failed, how, and how to see it."""
         for each in self.blocking:
             change = self.change_of.get(each.place)
             yield each.sentence()

@@ -13,7 +13,7 @@ from fleet2d.testing.gate import Place
 from fleet2d.testing.suite import SuiteTest, TrialKey, TrialOutcome, TrialReport
 
 APPLICATION = 0xF1EE72D
-"""What tells such a file from other SQLite files."""
+"""The application id that tells a history from other SQLite files."""
 VERSION = 1
 WAIT_S = 5.0
 """How long another program may hold the file [s]."""
@@ -31,7 +31,7 @@ CREATE TABLE verdicts (
 
 
 class PastTrials(NamedTuple):
-    """What the history knows about a test.
+    """The past trials of a test, by the history.
 
     Attributes:
         trials: The number of its trials.
@@ -51,7 +51,7 @@ class VerdictHistory:
         path: The file.
 
     Raises:
-        InputError: It is no such file, of another version, or in use.
+        InputError: The file is no history, of another version, or in use.
 
     Example:
         >>> import tempfile
@@ -175,7 +175,7 @@ class VerdictHistory:
         return found
 
     def past(self) -> dict[str, PastTrials]:
-        """Return what is known about each test, by its name."""
+        """Return the past trials of each test, by its name."""
         query = (
             "SELECT test, COUNT(*), SUM(error != '' OR EXISTS (SELECT 1 FROM verdicts"
             " WHERE trial = trials.id AND fails)), "
@@ -198,15 +198,15 @@ def plan(
     builds: int = 1,
     workers: int = 1,
 ) -> tuple[dict[str, int], list[str]]:
-    """Return how many trials of each test to run within a budget, and what is left out.
+    """Return how many trials of each test to run within a budget, and notes on tests left out.
 
-    The next trial is always that of the test that it tells most about for its time: whose share of
-    failures is most uncertain, by past verdicts and by the number of trials planned so far. Each
-    test gets one before any gets a second.
+    The next trial is always of the test about which it tells most for its time: that whose share of
+    failures is most uncertain, by past verdicts and the number of trials planned so far. Each test
+    gets one trial before any gets a second.
 
     Args:
         sizes: The number of trials of each test, by its name.
-        past: What is known about tests.
+        past: The past trials of tests, by name.
         tries: The largest number of runs.
         seconds: The wall time for them; None: any.
         builds: The number of builds that are run on each trial.
@@ -254,10 +254,10 @@ def plan(
 
 
 def _gain(count: int, past: PastTrials | None, cost_s: float) -> tuple[bool, float]:
-    """Return what sorts tests: whether none is planned yet, and what one more tells for its time.
+    """Return the sort key of a test: whether no trial is planned yet, and what one tells a second.
 
-    That is the decrease of the variance of its share of failures, which past trials put at about
-    (failed + 1/2) / (trials + 1).
+    A trial tells the decrease of the variance of the share of failures, which past trials put at
+    about (failed + 1/2) / (trials + 1).
     """
     failed, trials = (past.failed, past.trials) if past is not None else (0, 0)
     share = (failed + 0.5) / (trials + 1)

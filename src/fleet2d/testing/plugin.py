@@ -90,7 +90,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     from fleet2d.testing.failures import explain
     from fleet2d.testing.trials import run_claim
 
-    # pytest shows the lines of the test, but not those of its call to `fail`.
+    # Tracebacks of pytest then show the lines of the test, but not the calls to `fail` below.
     __tracebackhide__ = _is_error
     claim = _with_options(claim, pyfuncitem.config)
     body = _body(pyfuncitem)
@@ -162,7 +162,7 @@ def _folder(item: pytest.Function) -> Path:
 
 
 def _decision(result: "ClaimResult", body: "Body", wall_s: float) -> dict[str, Any]:
-    """Return what came of a claim as plain data."""
+    """Return the outcome of a claim as plain data."""
     from fleet2d.testing.suite import key_of, outcomes_of
 
     rate = result.claim.rate
@@ -178,7 +178,7 @@ def _decision(result: "ClaimResult", body: "Body", wall_s: float) -> dict[str, A
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: "pytest.CallInfo[None]") -> Iterator[None]:
-    """Add what came of the claim of a test to its report."""
+    """Add the outcome of a test's claim to its report."""
     outcome = yield
     if call.when != "teardown" and hasattr(getattr(item, "obj", None), CLAIM):
         setattr(outcome.get_result(), DECISION, item.stash.get(KEPT, {}))  # type: ignore[attr-defined]
@@ -198,7 +198,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.section("what the trials show")
         try:
             terminalreporter.line(str(answer(_gate(reports, config))))
-        except InputError as error:  # of the requirements
+        except InputError as error:  # the requirements are wrong
             terminalreporter.line(f"error: {error}")
 
 

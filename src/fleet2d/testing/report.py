@@ -12,7 +12,7 @@ from fleet2d.testing.gate import HELD, NOT_RUN, Gate, PairedChange, Tally, liste
 from fleet2d.viewing.page_data import POLICY, write_file
 
 MAX_BUILDS = 12
-"""Builds of the history in the page: the newest."""
+"""The number of builds in the page: the newest of the history."""
 STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 KIND_OF = {HELD: "good", NOT_RUN: "odd"}
 """Class of a cell with a verdict; "bad" for others."""

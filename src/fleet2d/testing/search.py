@@ -167,7 +167,7 @@ class TryJob:
     Attributes:
         base: The composed scenario.
         folder: The folder that its paths are relative to.
-        space: What varies.
+        space: The dimensions that vary.
         test: The file of a test and its name; None: the expectations of the scenario.
     """
 
@@ -222,7 +222,7 @@ class TryJob:
         return run_trial(Variant(self.scenario(point, seed), {"seed": seed}), self._body)
 
     def __call__(self, task: TryTask) -> tuple[float | None, str, str, str | None]:
-        """Return (margin, the same in its unit, what failed, error); margin or error is None."""
+        """Return (margin, margin in its unit, what failed, error); margin or error is None."""
         try:
             result = self.run(task.point, task.seed)
         except Exception as error:  # noqa: BLE001 - some points give no valid home; reported
@@ -256,7 +256,7 @@ class FailureSearch(TaskQueue):
     Attributes:
         failures: The failures.
         points: The points of all finished runs.
-        narrowest: The smallest margin so far, the same in its unit, and its point.
+        narrowest: The smallest margin so far, that margin in its unit, and its point.
         errors: Errors of runs that couldn't be simulated, with how often they happened.
     """
 
@@ -304,7 +304,7 @@ class FailureSearch(TaskQueue):
 
     @property
     def is_over(self) -> bool:
-        """Whether it has as many failures as it looks for."""
+        """Whether the search has found enough failures."""
         return len(self.failures) >= self._finds
 
     def never_failed(self) -> list[str]:
@@ -327,7 +327,7 @@ class FailureSearch(TaskQueue):
         return lines
 
     def answer(self, question: str, took: str) -> Conclusion:
-        """Return what failed, told apart, and which values never did; or how rare failures are.
+        """Return the distinct failures and the values that never failed; or how rare failures are.
 
         Args:
             question: What the search was for.
@@ -362,7 +362,8 @@ class FailureSearch(TaskQueue):
         lost = sum(self.errors.values())
         blind = min(self._random, self.tries) - lost
         if blind > 0:
-            # With a larger share of failing cases, so many random ones would miss it in 5 %.
+            # If more cases failed, fewer than 5 % of searches would miss them in so many random
+            # runs.
             most = 100 * (1 - 0.05 ** (1 / blind))
             yield f"The first {blind} were random, so at most {most:.3g} % of cases fail (95 %)."
         if self.narrowest is not None:
@@ -433,7 +434,7 @@ def _optuna(seed: int, startup: int) -> "optuna.Study":
 
 
 def _expect_no_more(_: object) -> None:
-    """Do nothing: the expectations are in the scenario. A job that has run is still pickled."""
+    """Do nothing: the expectations are in the scenario. A lambda couldn't be pickled with a job."""
 
 
 def claimed_tests(path: Path) -> list[str]:

@@ -47,7 +47,7 @@ SUFFIXES = (".yaml", ".yml")
 
 
 class Build(NamedTuple):
-    """A build of a robot: what is laid over the scenario of each test.
+    """A build of a robot: settings laid over the scenario of each test.
 
     Attributes:
         name: Its name.
@@ -69,12 +69,12 @@ class Build(NamedTuple):
         return scenario_of(document, scenario.folder)
 
 
-OWN = Build()
-"""Robots as the tests have them."""
+NO_CHANGES = Build()
+"""The build without settings: robots as the tests have them."""
 
 
 class TrialKey(NamedTuple):
-    """What two builds share in a pair of trials.
+    """The key of a trial; trials of two builds with the same key are a pair.
 
     Attributes:
         test: The name of the test.
@@ -88,7 +88,7 @@ class TrialKey(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The home, of several, and the seed."""
+        """The home, if there are several, and the seed."""
         return f"home {self.home}, seed {self.seed}" if self.home else f"seed {self.seed}"
 
 
@@ -106,14 +106,14 @@ def key_of(test: str, variant: Variant) -> TrialKey:
 
 @dataclass(frozen=True)
 class TrialOutcome:
-    """What came of an expectation in a trial.
+    """The outcome of an expectation in a trial.
 
     Attributes:
         name: The name of the expectation.
         holds: Whether it held; None if it was not put to the test.
         fails: Whether that fails the trial.
         says: By how much it held or failed, and when.
-        margin: By how much it held, below 0 if not [unit]; None for what is only true or false.
+        margin: By how much it held, below 0 if not [unit]; None if it is only true or false.
         unit: Unit of the margin; "s" for time to spare.
         step: The worst step of a failure.
         covers: The requirements that it covers.
@@ -133,7 +133,7 @@ class TrialOutcome:
 
 @dataclass(frozen=True)
 class TrialReport:
-    """What came of a trial of a build.
+    """The report of a trial of a build.
 
     Attributes:
         key: The trial.
@@ -181,7 +181,7 @@ class SuiteTest:
         """Its name in tables and in the history."""
         return f"{self.path.as_posix()}::{self.function}" if self.function else self.path.as_posix()
 
-    def claim(self, build: Build = OWN) -> Claim:
+    def claim(self, build: Build = NO_CHANGES) -> Claim:
         """Return the claim of a Python test about a build.
 
         Raises:
@@ -198,7 +198,7 @@ class SuiteTest:
             return claim
         return replace(claim, source=build.over(claim.scenario), overrides=(), settings={})
 
-    def variants(self, build: Build = OWN) -> list[Variant]:
+    def variants(self, build: Build = NO_CHANGES) -> list[Variant]:
         """Return the scenario of each trial with a build.
 
         Raises:
@@ -214,11 +214,11 @@ class SuiteTest:
         return variants
 
     def rate(self, trials: int) -> RateTest:
-        """Return what it claims of so many trials: a scenario claims that all hold."""
+        """Return the claim of the test about so many trials; a scenario claims that all hold."""
         return self.claim().rate if self.function else rate_test(trials)
 
     def body(self) -> Body:
-        """Return what a trial does."""
+        """Return the function that a trial calls."""
         return claimed_test(self.path, self.function)[0] if self.function else Trial.run
 
     def keys(self) -> list[TrialKey]:
@@ -226,7 +226,7 @@ class SuiteTest:
         return [key_of(self.name, variant) for variant in self.variants()]
 
     def fingerprint(self) -> str:
-        """Return a digest of all that the test is without the build."""
+        """Return a digest of the test without the build."""
         scenario = self.claim().scenario if self.function else load_scenario(self.path)
         content = {k: v for k, v in scenario.resolved().items() if k not in BUILD_SECTIONS}
         content["simulation"].pop("seed", None)
@@ -362,7 +362,7 @@ class SuiteTask(WorkerTask):
     """One trial of a build.
 
     Attributes:
-        key: What it shares with the trial of another build.
+        key: The key that it shares with the trial of another build.
         test: The number of the test.
         build: The number of the build.
         trial: The number of the trial among those of the test.
@@ -492,7 +492,7 @@ def run_suite(
 def _reports(
     job: SuiteJob, tasks: list[SuiteTask], workers: int
 ) -> Iterator[tuple[int, TrialReport]]:
-    """Yield the number and report of each task: the first few seconds here, then of workers."""
+    """Yield the number and report of each task: for some seconds from here, then from workers."""
     waiting = list(reversed(tasks))
     end_s = time.monotonic() + PATIENCE_S
     while waiting and (workers == 1 or len(waiting) == 1 or time.monotonic() < end_s):
@@ -527,5 +527,5 @@ def check_set_up(tests: Iterable[SuiteTest], *, strict: bool) -> None:
     for test in tests:
         if test.function:
             test.claim().prepare()
-        elif test.homes == (("", ()),):  # of several homes, some may lack what it needs
+        elif test.homes == (("", ()),):  # not every home may have what it needs
             report_wrong(Simulation(test.variants()[0].scenario), strict=strict)

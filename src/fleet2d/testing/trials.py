@@ -26,12 +26,12 @@ from fleet2d.scenario.model import Scenario
 from fleet2d.testing.claim import Claim, SetUpError, Variant, nested_rate_interval, percent
 
 TEST = "test"
-"""The name of a test that tests nothing among its expectations."""
+"""The name, among the expectations, of a test that tests nothing."""
 MISSED = "missed"
 MISSED_BY_THE_END = "missed by the end"
-"""Kinds of violation of what never came about: in its time, or by the end of the run."""
+"""Kinds of violation: something never came about in its time, or by the end of the run."""
 ASSERT = "assert"
-"""The name of a failed `assert` of a test among its expectations."""
+"""The name, among the expectations, of a failed `assert`."""
 SMALLEST_MARGIN = 1e-9
 SCALES = {"m": 1.0, "m/s": 0.5, "share": 0.1, "s": 60.0, "times": 1.0}
 """Margins that count as neither narrow nor wide, by unit; 1 for others."""
@@ -146,9 +146,9 @@ class ExpectationResult:
         untested: Whether the run didn't put it to the test.
         kind: What kind of violation it is: `MISSED` or `MISSED_BY_THE_END` if something didn't come
             about, its line for an `assert`, else empty.
-        names: What it is about: names of bodies, rooms, doors and the like.
+        names: The names of bodies, rooms, doors and the like in it.
         evidence: Its signals, if it failed, for a picture.
-        verdict: The verdict; None for what is no expectation, such as an `assert`.
+        verdict: The verdict; None for an `assert`.
         covers: The requirements that it covers.
     """
 
@@ -176,7 +176,7 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
     margin = comparable(value, SCALES.get(unit, 1.0))
     if (margin > 0) != (verdict.holds is not False):  # fulfilled just in time, or just too late
         margin = -math.copysign(SMALLEST_MARGIN, margin)
-    repeated = f"{verdict.expectation} is violated: {verdict.expectation}"  # without a name
+    repeated = f"{verdict.expectation} is violated: {verdict.expectation}"  # if it has no name
     text = str(verdict).replace(repeated, f"{verdict.expectation} is violated")
     names = (name for measurement in expectation.measures() for name in measurement.named())
     return ExpectationResult(
@@ -194,7 +194,7 @@ def result_of(verdict: Verdict, expectation: Expectation) -> ExpectationResult:
 
 
 def margin_of(verdict: Verdict) -> tuple[float, str]:
-    """Return the margin of a verdict and its unit: without a finite one, its time to spare [s]."""
+    """Return the margin of a verdict with its unit; if that isn't finite, the time to spare [s]."""
     if not math.isfinite(verdict.robustness) and verdict.slack_s is not None:
         return verdict.slack_s, "s"
     return verdict.robustness, verdict.unit
@@ -233,7 +233,7 @@ class TrialResult:
         variant: The scenario.
         results: The results of the expectations.
         steps: Number of simulated steps.
-        acts: For each intervention the names that it uses.
+        acts: The names that each intervention uses.
         error: The failed `assert` of the test; None if all held.
         untested: Why nothing was tested, such as that the test expects nothing.
     """
@@ -257,7 +257,7 @@ class TrialResult:
 
     @property
     def amount(self) -> str:
-        """The same margin in its unit, as text; empty if it has no size."""
+        """The smallest margin in its unit, as text; empty if it has no size."""
         return self._narrowest.amount
 
     @property
@@ -420,7 +420,7 @@ def run_trial(
 
 
 def asserts(function: Any, depth: int = 4) -> bool:
-    """Whether a function has an `assert`, or calls one of its module that has."""
+    """Return whether a function has an `assert`, or calls one of its module that does."""
     function = inspect.unwrap(function)
     code = getattr(function, "__code__", None)
     if code is None or depth == 0:

@@ -7,12 +7,12 @@ from typing import Any
 
 
 def load_ipython_extension(shell: Any) -> None:
-    """Let runs and homes that a cell ends with show themselves, in Jupyter and IPython."""
+    """Register how Jupyter and IPython show a run or a home at the end of a cell."""
     formatters = shell.display_formatter.formatters
     formatters["text/html"].for_type_by_name("fleet2d.runs.run", "Run", _run_html)
     for module, name in (("plan", "FloorPlan"), ("home", "Home")):
         formatters["image/png"].for_type_by_name(f"fleet2d.floorplan.{module}", name, _home_png)
-    # What `draw` returns; pyplot's own formatter, where there is one, comes first.
+    # For figures of `draw`; where pyplot has registered its own formatter, that comes first.
     formatters["image/png"].for_type_by_name("matplotlib.figure", "Figure", _figure_png)
 
 

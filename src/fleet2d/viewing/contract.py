@@ -7,14 +7,14 @@ test compares both.
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, TypeAdapter
-from typing_extensions import TypedDict  # pydantic reads that of typing from Python 3.12 on only
+from typing_extensions import TypedDict  # pydantic reads that of typing only from Python 3.12 on
 
 from fleet2d.errors import InputError
 from fleet2d.runtime.events import EventKind
 
 Point = tuple[float, float]
 Shape = TypeVar("Shape")
-# The size of a request with an order.
+# The largest size of a request with an order.
 MAX_BODY_BYTES = 4_096
 
 
@@ -25,7 +25,7 @@ def read_body(
 
     Args:
         body: The body of the request.
-        shape: What reads the type.
+        shape: The adapter of the type.
         refusal: The message if the body is of another type.
         most: The largest number of bytes.
 

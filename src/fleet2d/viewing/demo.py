@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 IN_WORDS = {Outcome.DEFERRED: "put off", Outcome.MISTAKEN: "said to somebody else"}
-"""Outcomes of addressing a person whose names say too little."""
+"""Words for outcomes of addressing a person whose names say too little."""
 DID = {
     "ask": "asked",
     "deliver": "brought something to",
@@ -121,8 +121,8 @@ def sentences(run: "Run") -> Iterator[str]:
 
 
 def _waking_share(user: str, events: Sequence[dict[str, Any]], steps: int) -> float | None:
-    """Return in which share of the steps at home and awake some robot saw a user; None: of none."""
-    is_awake = is_out = False  # until the first activity
+    """Return the share of a user's steps at home and awake in which some robot saw the user."""
+    is_awake = is_out = False  # unknown until the first activity
     seen_by = since = waking = seen = 0
     for event in (*events, {"step": steps, "entity": user, "event": ""}):
         is_own = event["entity"] == user

@@ -39,7 +39,8 @@ BLUR_M = 0.15
 SAMPLES = 40_000
 HEIGHT_IN = 7.0
 
-# Pictures of failures: signals drawn, their height, and that of the text; seconds shown around.
+# Pictures of failures: the most signals drawn, heights of a signal and of the text, and the time
+# shown around.
 MAX_COURSES = 4
 COURSE_IN = 1.05
 HEAD_IN = 0.75
@@ -65,10 +66,10 @@ def draw_moment(run: Run, step: int, path: Path) -> None:
 def draw_failure(
     run: Run, step: int, path: Path, text: str, evidence: VerdictEvidence | None
 ) -> None:
-    """Draw the moment at which an expectation failed, with what it is about.
+    """Draw the moment at which an expectation failed, with the rooms and signals in it.
 
-    Its rooms and distances are marked, and its signals drawn over the minutes around the moment,
-    each with its bound.
+    Rooms and distances are marked, and signals drawn over the minutes around the moment, each with
+    its bound.
 
     Args:
         run: The run.

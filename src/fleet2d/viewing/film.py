@@ -134,15 +134,15 @@ SUFFIXES = (".mp4", ".gif", ".webp")
 MAX_FRAMES_PER_S = 25
 HEIGHT_PX = 720
 HEIGHT_IN = 7.2
-# The same quality for all pictures: a quality that follows how much moves costs twice the time, and
-# spends its bytes on pictures in which nothing moves.
+# Constant quality: one that adapts to motion takes twice the time, and spends its bytes on pictures
+# in which nothing moves.
 X264 = {"preset": "ultrafast", "qp": "18"}
 ROWS_BETWEEN = 16  # equal rows between two parts of a picture that have changed
-# A GIF or WebP is written from pictures that are all in memory.
+# The limit for GIF and WebP, whose pictures are all in memory.
 MAX_PICTURES = 3_000
-# Pictures of the home in its light that are kept: drawing one takes as long as ten of its bodies.
+# The number of pictures of the lit home to keep: drawing one takes as long as drawing ten bodies.
 MAX_LIT = 24
-# Pictures that wait to be encoded: only their changed parts are kept.
+# The number of pictures that may wait to be encoded, as their changed parts.
 MAX_WAITING = 16
 
 
@@ -165,7 +165,7 @@ def write_film(
         end: The step before which to end.
         speed: Simulated time over the time of the film.
         height: The height of the film [pixels].
-        frames_per_s: At most so many frames to a second of film.
+        frames_per_s: The largest number of frames per second of film.
 
     Raises:
         InputError: The file name has another suffix, a number is out of range, or the file can't be
@@ -344,7 +344,7 @@ class ChangedPart(NamedTuple):
 
 
 def changed_parts(last: U8, pixels: U8) -> list[ChangedPart]:
-    """Return the rectangles in which a picture differs from the last one, which it becomes.
+    """Return the rectangles in which a picture differs from the last, and update the last.
 
     Converting the colours of whole pictures would take as long as drawing them. Corners and sizes
     are even, as are those of the picture: colours are stored for two by two pixels.
@@ -376,7 +376,7 @@ def changed_parts(last: U8, pixels: U8) -> list[ChangedPart]:
 
 
 def _even_ends(places: NDArray[np.intp]) -> tuple[int, int]:
-    """Return the even numbers between which some sorted places are."""
+    """Return the even numbers that enclose sorted places."""
     return int(places[0]) // 2 * 2, int(places[-1]) // 2 * 2 + 2
 
 

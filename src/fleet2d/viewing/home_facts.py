@@ -114,13 +114,13 @@ def object_facts(item: PlacedObject, symbols: dict[tuple[str, float, float], int
 
 
 class SymbolPlace(NamedTuple):
-    """Where the symbol of a piece of furniture is [m]: its middle, and its size by its front.
+    """The place of the symbol of a piece of furniture [m].
 
     Attributes:
         middle: The middle of the piece.
         wide: Its extent from left to right.
         deep: Its extent from back to front.
-        is_box: Whether it is a box along its front, which its symbol fills.
+        is_box: Whether the piece is a box aligned with its front, which the symbol fills.
         right: The direction to its right, float64 (2,).
         forward: The direction of its front, float64 (2,).
     """
@@ -134,7 +134,7 @@ class SymbolPlace(NamedTuple):
 
 
 def placed_symbol(item: PlacedObject) -> SymbolPlace:
-    """Return where the symbol of a piece of furniture is."""
+    """Return the place of the symbol of a piece of furniture."""
     front = front_of(item)
     forward = np.array([math.cos(front), math.sin(front)])
     right = np.array([forward[1], -forward[0]])
@@ -154,8 +154,8 @@ def placed_symbol(item: PlacedObject) -> SymbolPlace:
 def front_of(item: PlacedObject) -> float:
     """Return the direction of the front of a piece of furniture [rad].
 
-    Where it isn't given, people who sit or lie on it look to its front, and who stands at it looks
-    at it.
+    If it isn't given, people who sit or lie on the piece face its front, and people who stand at it
+    face the piece.
     """
     if item.heading or not item.uses:
         return item.heading

@@ -37,7 +37,7 @@ MAX_CORNERS = 60
 class LiveEngine:
     """A running simulation.
 
-    A body that a page has called stays where it was called or placed last, until the next call.
+    A body that a page has called stays where it was last called or placed, until the next call.
     Watching has no effect on the run: its artifacts are the same, watched or not.
     """
 
@@ -147,7 +147,7 @@ class LiveEngine:
 
         Raises:
             InputError: There is nothing of that name, or the place isn't free.
-            ComponentError: The same, of doors.
+            ComponentError: There is no door of that name, or it can't be moved.
         """
         name = order["target"]
         place = (order["x"], order["y"])
@@ -196,7 +196,7 @@ class LiveEngine:
 
 
 FRAME_US = 60_000_000  # maximum simulated time between two frames
-FRAMES_PER_S = 30  # at a chosen speed
+FRAMES_PER_S = 30  # if a speed is chosen
 BATCHES_PER_S = 30
 MAX_QUEUED = 4_000  # frames in the queue of a page
 ORDER_WAIT_S = 10.0
@@ -332,7 +332,7 @@ class LiveRun:
                 self.engine.apply(order)
 
     def _state(self) -> LiveFrame:
-        """Return the frame of the current step; events and marks since the last one."""
+        """Return the frame of the current step, with events and marks since the last frame."""
         engine = self.engine
         records = engine.interventions()
         self._frame = LiveFrame(
@@ -364,7 +364,7 @@ class LiveRun:
                     watcher.put(frame)
 
     def frames(self) -> Iterator[list[LiveFrame]]:
-        """Yield the frames of the run from now on, in batches; empty ones while there are none."""
+        """Yield the frames of the run from now on, in batches, which are empty without news."""
         watcher: queue.Queue[LiveFrame] = queue.Queue()
         with self._lock:
             self._watchers.append(watcher)

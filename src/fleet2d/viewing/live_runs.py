@@ -35,7 +35,7 @@ class LiveRuns:
 
         Args:
             served: The runs that are served: branches begin from them, and ended runs join them.
-            first: A simulation that somebody else starts and ends.
+            first: A simulation that the caller starts and ends.
         """
         self._served = served
         self._lives: list[tuple[LiveRun, LiveSession]] = []

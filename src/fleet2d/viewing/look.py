@@ -22,7 +22,7 @@ JOINT_M = 0.012
 WOOD = ("#e8d3b3", "#e5cfae", "#ebd8ba", "#e2caa6")
 CARPET = ("#dcdde8", "#e3dce0", "#dbe2e2")
 UNKNOWN = "#f4f4f2"
-"""The floor of rooms of which nobody knows what they are for."""
+"""The floor of rooms of an unknown type."""
 
 CARPETED = ("bedroom", "child_room", "guest_room", "wardrobe")
 WET = ("#dce9ea", 0.3)
@@ -50,7 +50,7 @@ WALL_M = 0.15
 """Thickness of outer walls, which files don't contain."""
 
 LIFT_M = 0.17
-"""The tops of walls are so far above the floor, as if seen a little from the south."""
+"""The offset of the tops of walls, as if seen a little from the south."""
 
 WALL_TOP = "#fcfbf8"
 WALL_FACE = "#bdb4a6"
@@ -62,7 +62,7 @@ OUTLINE_EDGE = "#8b857b"
 
 NIGHT = ("#283e78", 0.55)
 DUSK = ("#ffb070", 0.22)
-"""Colour and opacity of the darkest and of the reddest light, over what it falls on."""
+"""Colours and opacities of the darkest and of the reddest light, over the home."""
 
 OUT = ("Out of home", "#e4e0d7")
 OTHER = ("Other", "#9aa3ad")
@@ -93,7 +93,7 @@ ACTIVITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType(
 
 
 def constants() -> dict[str, Any]:
-    """Return the tables that the page draws by, as JSON has them."""
+    """Return the tables by which the page draws, as JSON data."""
     return {
         "planks": {"pitch": PLANK_M, "joint": JOINT_M, "colors": WOOD},
         "unknown": UNKNOWN,
@@ -191,7 +191,7 @@ class Symbol:
         edge: str | None = None,
         radius: float = 0.0,
     ) -> None:
-        """Draw a shape at two places, as `symbols.yaml` has them; none without an extent."""
+        """Add a shape between two corners, as in `symbols.yaml`, unless it has no extent."""
         x0, y0, x1, y1 = (round(self._place(place), 4) for place in at)
         if kind != "line" and (x1 <= x0 or y1 <= y0):
             return
@@ -300,7 +300,7 @@ _UPON: Mapping[str, Callable[[Symbol], None]] = MappingProxyType(
         "stove": _stove,
     }
 )
-"""What is drawn upon listed shapes, as its number or its size depends on the piece."""
+"""Functions that draw further shapes, whose number or size depends on the piece."""
 
 
 @cache
@@ -315,7 +315,7 @@ def symbol_names() -> set[str]:
 
 
 def symbol_of(kind: str, wide: float, deep: float) -> list[ShapeFacts]:
-    """Return the symbol of a type of furniture at a size [m]; a plain box of an unknown one.
+    """Return the symbol of a type of furniture at a size [m]; a plain box for an unknown type.
 
     >>> [shape["kind"] for shape in symbol_of("nightstand", 0.4, 0.4)]
     ['box', 'ellipse']

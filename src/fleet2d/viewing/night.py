@@ -38,13 +38,13 @@ class Light:
     """The light of a run: of the sky, and in its rooms.
 
     Attributes:
-        key: How dark and how red it is, and which rooms are lit: what was drawn last.
-        image: What is drawn over the rooms.
-        walls: What is drawn over the walls.
+        key: The shade, redness and lit rooms that were drawn last.
+        image: The veil over the rooms.
+        walls: The veil over the walls.
     """
 
     def __init__(self, run: Run, plan: FloorPlan, bodies: list[BodyFacts], axes: Axes) -> None:
-        """Read what the light depends on.
+        """Read the hours, activities and switches on which the light depends.
 
         Args:
             run: The run.
@@ -107,7 +107,7 @@ class Light:
         return not self._starts_unlit if is_on is None else bool(is_on)
 
     def _last(self, key: str, step: int) -> Any:
-        """Return what the last event of a key says at a step; None if there is none yet."""
+        """Return the value of a key's last event up to a step; None if there is none yet."""
         steps, values = self._switched.get(key, ([], []))
         number = bisect_right(steps, step) - 1
         return None if number < 0 else values[number]
@@ -121,7 +121,7 @@ def sky_at(
     Args:
         skies: The hours of each day around which it gets light and dark, see `skies_of`.
         moment: The local time.
-        start: That of the start of the run.
+        start: The local time at which the run starts.
 
     Example:
         >>> sky = (5.0, 7.0, 18.0, 20.0)

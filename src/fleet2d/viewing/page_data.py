@@ -47,7 +47,7 @@ class PageData:
     """
 
     def __init__(self, run: Run) -> None:
-        """Take a run; nothing is computed."""
+        """Wrap a run; nothing is computed yet."""
         self.run = run
         self.title = run_title(run)
         self._lock = threading.Lock()
@@ -91,13 +91,13 @@ class PageData:
 
     @cached_property
     def postures(self) -> PostureFacts:
-        """When people sit or lie, and where."""
+        """The stretches in which people sit or lie, and where."""
         return posture_facts(self.run, self.run.plan)
 
     def table_path(self, name: str) -> Path:
         """Return the Parquet file of a table.
 
-        Decisions that the run didn't store are those of its repetition.
+        Decisions that the run didn't store are taken from its repetition.
 
         Raises:
             ArtifactError: The run has no such table, or can't be repeated for it.
@@ -113,7 +113,7 @@ class PageData:
             path = path_in(self.run.directory, f"{name}.parquet")
             if path.is_file():
                 return path
-        # A run in memory, or an unfinished one, whose rows are in its journal.
+        # A run in memory has no file, and an unfinished one has its rows in a journal.
         return self._temporary_file(name, lambda: self.run.tables[name])
 
     def _temporary_file(self, name: str, table: Callable[[], Any]) -> Path:

@@ -254,7 +254,7 @@ class PageServer:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind((HOST, port))
-            self._socket.listen()  # at once: a browser may be there before the server is
+            self._socket.listen()  # now, as the browser may ask before the server runs
         except (OSError, OverflowError) as error:
             self._socket.close()
             raise InputError(f"port {port} can't be used: {error}; choose another --port") from None
@@ -266,7 +266,7 @@ class PageServer:
         self._runs = ServedRuns(sources)
         self._live = LiveRuns(self._runs, live)
         app = page_app(self._runs, token, self._port, self._live, seen_at=seen_at)
-        # Quiet: a page that is open when the server ends is not an error.
+        # Uvicorn would report a page that is open when the server ends as an error.
         config = uvicorn.Config(
             app, log_level="critical", lifespan="off", ws="none", timeout_graceful_shutdown=1
         )

@@ -101,7 +101,7 @@ def intervention_label(record: Mapping[str, Any]) -> str:
 def slow_floors(
     scenario: Mapping[str, Any], records: Iterable[Mapping[str, Any]], clock: Clock
 ) -> list[SlowFacts]:
-    """Return the floors that slow robots down, of a scenario and of records of interventions."""
+    """Return the floors that slow robots down, by a scenario and by records of interventions."""
     areas = scenario["floorplan"].get("slows", ())
     from_start = [{"do": "slow", "step": 0, **area} for area in areas]
     return slow_floors_of([*from_start, *records], clock)
@@ -125,7 +125,7 @@ def slow_floors_of(records: Iterable[Mapping[str, Any]], clock: Clock) -> list[S
 
 
 def _slow_words(area: SlowArea) -> str:
-    """Return what robots do on a floor that slows them down."""
+    """Return the effect on robots of a floor that slows them down, in words."""
     parts = []
     if area.speed < 1:
         parts.append(f"robots drive at {area.speed:.0%}")
@@ -135,7 +135,7 @@ def _slow_words(area: SlowArea) -> str:
 
 
 def starts_unlit(scenario: Mapping[str, Any]) -> bool:
-    """Return whether people switch lights, which are off at first then."""
+    """Return whether people switch lights, in which case all are off at first."""
     return any(user.get("lights") for user in scenario.get("users", {}).values())
 
 
@@ -194,7 +194,7 @@ def sightings_of(run: Run) -> list[SightingFacts]:
 
     gap = max(1, round(JOIN_S * 1e6 / run.manifest["step_us"]))
     lanes: dict[tuple[str, str], SightingFacts] = {}
-    robots: dict[str, None] = {}  # in the order in which they appear, as users
+    robots: dict[str, None] = {}  # a set in order of appearance
     users: dict[str, None] = {}
     for batch in _observations(run):
         robot, robot_names = categories(batch["robot"])
@@ -203,7 +203,7 @@ def sightings_of(run: Run) -> list[SightingFacts]:
         users |= dict.fromkeys(user_names)
         step = values_of(batch["step"])
         false = _are_false(batch)
-        names = [*user_names, ""]  # the last one is of an unknown user
+        names = [*user_names, ""]  # the last is for unknown users
         for number, robot_name in enumerate(robot_names):
             for known, name in enumerate(names):
                 rows = (robot == number) & (user % len(names) == known)
@@ -233,7 +233,7 @@ def _observations(run: Run) -> Iterator[Any]:
 
 
 def _are_false(table: Any) -> Bool:
-    """Return which observations are of something else than the user that the robot took it for."""
+    """Return which observations are of something other than the user that the robot recognized."""
     import pyarrow.compute as pc
 
     from fleet2d.artifacts.arrow import values_of
@@ -341,7 +341,7 @@ def offsets_of(clock: Clock) -> list[tuple[int, int]]:
 
 
 def as_json(result: Any) -> Any:
-    """Return the result of a metric as JSON has it: numbers that aren't finite are words.
+    """Return the result of a metric as JSON data: numbers that aren't finite become words.
 
     >>> as_json({"error": math.nan, "parts": [1.5, math.inf, "none"]})
     {'error': 'nan', 'parts': [1.5, 'inf', 'none']}
@@ -358,7 +358,7 @@ def as_json(result: Any) -> Any:
 def skies_of(scenario: Mapping[str, Any], clock: Clock) -> list[tuple[float, float, float, float]]:
     """Return when it gets light and dark on each day; see `RunFacts`.
 
-    Without the home's latitude it is as for cameras by default: the same on each day.
+    Without the home's latitude, the hours are the default ones of cameras on each day.
     """
     daylight = scenario["simulation"].get("daylight")
     if daylight is None:
@@ -475,7 +475,7 @@ def _role(scenario: Mapping[str, Any], name: str) -> Role:
 
 
 def live_facts(simulation: Simulation) -> RunFacts:
-    """Return what the page receives about a running simulation, which has no tables yet."""
+    """Return the facts of a running simulation, which has no tables yet."""
     scenario = plain(simulation.scenario.resolved())
     clock = simulation.clock
     plan = simulation.home.plan

@@ -60,7 +60,7 @@ def checked_notes(body: bytes) -> list[NoteFacts]:
     """Return the notes in a file or a request.
 
     Raises:
-        InputError: It is not a list of notes, or there are too many.
+        InputError: The body is not a list of notes, or there are too many.
 
     Example:
         >>> checked_notes(b'[{"step": 5, "text": "why?"}, {"step": 2, "text": ""}]')

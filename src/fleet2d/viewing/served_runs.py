@@ -32,7 +32,7 @@ def problem(message: str, status: int = 422) -> Response:
 
 
 def endpoint(respond: Callable[[Request, bytes], Response]) -> Endpoint:
-    """Return an endpoint that works in a thread; its response to errors is their message.
+    """Return an endpoint that works in a thread, and answers an error with its message.
 
     Args:
         respond: Returns the response to a request and its body; only a POST has one, of JSON.
@@ -110,7 +110,7 @@ class ServedRuns:
         return source
 
     def preload(self) -> None:
-        """Compute the data that the page requests first; errors are reported on its request."""
+        """Compute the data that the page requests first; errors are reported when it does."""
         for number in range(len(self._sources)):
             with suppress(Fleet2DError, OSError, ValueError, KeyError):
                 data = self.data(number)
@@ -119,7 +119,7 @@ class ServedRuns:
                 _ = data.tracks
                 _ = data.sightings
                 _ = data.postures
-        release_memory()  # the tables that were read
+        release_memory()  # of the tables that were read
 
     def routes(self) -> list[Route]:
         """Return the routes of the data of all runs."""

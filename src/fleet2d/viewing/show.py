@@ -156,7 +156,7 @@ def show_log(
         source: The directory of a run.
         robot: The robot.
         day: The day of the run; None: all days.
-        part: Where it begins and ends instead, as texts; None: at those of the run.
+        part: The begin and the end instead of a day, as texts; None: those of the run.
         out: The file to write; None: standard output.
         trust: Whether code of the run may be run.
 
@@ -194,7 +194,7 @@ def _check_alone(picture: "RunPicture", **others: object) -> None:
     """Refuse options of pictures beside those of a log.
 
     Raises:
-        InputError: One is given.
+        InputError: Such an option is given.
     """
     pictures = picture._replace(begin=None, end=None)
     if pictures != RunPicture() or any(others.values()):
@@ -266,7 +266,7 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture, *, trust: 
     run = open_run(directory, trust=trust)
     if trust:
         show_code(run.manifest)
-    print_verdict(run, err=True)  # stdout is the path
+    print_verdict(run, err=True)  # stdout is for the path
     if picture.layer is not None:
         from fleet2d.viewing.pictures.layers import draw_layer
 
@@ -302,7 +302,7 @@ def _draw_run(directory: Path, out: Path | None, picture: RunPicture, *, trust: 
 def _draw_checkup(
     source: Path | None, out: Path | None, radius: float, **lengths: float | None
 ) -> Path:
-    """Draw a floor plan with what is wrong or odd in it; return the path of the picture."""
+    """Draw a floor plan with the findings about it; return the path of the picture."""
     from fleet2d.floorplan.checkup import checkup
     from fleet2d.floorplan.load import load_or_mark
     from fleet2d.viewing.pictures.floorplan import draw_checkup

@@ -151,7 +151,7 @@ Box = tuple[float, float, float, float]
 """Left, bottom, right and top of a text [m]."""
 
 
-# What came of a request or question, in words.
+# The outcomes of requests and questions as they are shown.
 SHOWN_AS = {
     Outcome.ACCEPTED: Outcome.ACCEPTED,
     Outcome.DEFERRED: Outcome.DEFERRED,
@@ -160,7 +160,7 @@ SHOWN_AS = {
     Outcome.BANNED: "sent away",
     Outcome.SWITCHED_OFF: "sent away",
 }
-# Events by which a robot is no longer with the person whom it addressed.
+# Events that end the time of a robot with the person whom it addressed.
 ENDS_TALK = frozenset(
     {EventKind.DELIVERED, EventKind.COLLECTS, EventKind.WITHDRAWS, EventKind.INTERACTION_OVER}
 )
@@ -172,8 +172,8 @@ class AskedTime(NamedTuple):
     Attributes:
         robot: The robot.
         text: The interaction and the person meant.
-        step: When.
-        answer: What came of it, in words.
+        step: The step at which it did.
+        answer: The outcome in words.
         answered: The step of the answer; None without one.
         end: The step at which the robot had carried it out or withdrew; None if it did neither.
     """
@@ -253,8 +253,8 @@ class Stage:
             run: The whole run.
             first: The first step that can be shown.
             end: The step after the last that can be shown.
-            axes: Axes for the plan alone; or
-            figure: an empty figure, for the plan and a strip of the time between both steps.
+            axes: Axes for the plan alone; None with a figure.
+            figure: An empty figure for the plan and a strip of the time between both steps.
             stride: The number of steps between consecutive frames.
 
         Raises:
@@ -302,7 +302,7 @@ class Stage:
 
     @property
     def _collections(self) -> list[Collection]:
-        """What all bodies are drawn by, except their names, in the order of drawing."""
+        """The artists of all bodies, except their names, in the order of drawing."""
         below = [self._views, self._edges, self._paths, self._sightings]
         return [*below, self._noses, self._discs]
 
@@ -318,7 +318,7 @@ class Stage:
 
     @property
     def light_key(self) -> Key:
-        """What the light that is shown depends on."""
+        """The key of the light that is shown."""
         return self._light.key
 
     @property
@@ -418,7 +418,7 @@ class Stage:
         return text
 
     def _end_of(self, talk: AskedTime) -> int:
-        """Return the last step at which a talk is shown, else a minute after its last word."""
+        """Return the last step of a talk; without an end, that a minute after its last word."""
         if talk.end is not None:
             return talk.end
         last = talk.step if talk.answered is None else talk.answered
@@ -564,7 +564,7 @@ def _box_of(text: Text, point_m: float) -> Box:
 
 
 def _is_free(box: Box, taken: Iterable[Box]) -> bool:
-    """Return whether a box meets no other one."""
+    """Return whether a box overlaps no other one."""
     left, bottom, right, top = box
     return not any(
         left < other_right and other_left < right and bottom < other_top and other_bottom < top

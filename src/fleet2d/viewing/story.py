@@ -30,10 +30,10 @@ KINDS = (
 SIGHTINGS = (EventKind.USER_SEEN, EventKind.USER_LOST)
 ASLEEP = "sleep"
 EVENING_H = 20
-"""A night begins at this hour: who goes to bed at one is later than who goes at eleven."""
+"""The hour at which a night begins, so that going to bed at one is later than at eleven."""
 
 LEAST_SLEEP = timedelta(hours=1)
-"""Who sleeps for less has a nap."""
+"""Shorter sleep is a nap."""
 
 LEAST_UNSEEN = timedelta(minutes=20)
 SETTLED = 1.1
@@ -98,7 +98,7 @@ def _requests(events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
 
 
 def _searches(events: Sequence[StoredEvent], clock: Clock) -> Iterator[StoryFacts]:
-    """Yield the first search that found somebody, and the one that took longest until it did."""
+    """Yield the first successful search, and the longest one."""
     begun: dict[tuple[str, str], int] = {}
     first: StoredEvent | None = None
     longest: tuple[int, StoredEvent] | None = None
@@ -227,7 +227,7 @@ def _failure(run: Run) -> Iterator[StoryFacts]:
 
 
 def titled(name: str) -> str:
-    """Return the name of a body as a sentence has it."""
+    """Return the name of a body as a sentence writes it."""
     return plain(name[:1].upper() + name[1:])
 
 

@@ -34,7 +34,7 @@ def sources() -> dict[str, Path]:
 def write_notebook(name: str) -> Path:
     """Write a tutorial or a guide as a notebook, unless it is there already.
 
-    It gets a folder, as its cells write files: two notebooks may have files of the same name.
+    The notebook gets a folder, as its cells write files: two may have files of the same name.
 
     Raises:
         InputError: There is no such tutorial or guide, or the file can't be written.
@@ -96,7 +96,7 @@ def _cell(kind: str, source: str, **more: Any) -> dict[str, Any]:
 
 
 def open_in_jupyter(path: Path) -> bool:
-    """Open a notebook in Jupyter until that is shut down; return whether that was possible."""
+    """Open a notebook in Jupyter, and wait until it is shut down; return whether all went well."""
     program = next((module for module in JUPYTER if find_spec(module)), None)
     if program is None:
         return False

@@ -147,7 +147,7 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
         algorithm: The algorithm; its output must be presence: rows `user, room, share`.
 
     Raises:
-        ArtifactError: The run has no such table, or it isn't of presence.
+        ArtifactError: The run has no such table, or the table isn't of presence.
     """
     table = run.arrow(algorithm)
     users = run.manifest["entities"]["users"]
@@ -160,7 +160,7 @@ def forecasts_of(run: Run, algorithm: str) -> Forecasts:
             " a presence algorithm such as ltp or rtp"
         )
     shares = table["share"].to_numpy().reshape(-1, len(users) + 1, places)
-    at = "at" if "at" in table.column_names else "step"  # of `belief_table`, of the others
+    at = "at" if "at" in table.column_names else "step"  # only `belief_table` has `at`
     steps = table[at].to_numpy().reshape(shares.shape)[:, 0, 0]
     every = timedelta(microseconds=run.manifest["step_us"])
     beliefs = []
@@ -206,7 +206,7 @@ def draw_forecasts(name: str, belief: F64, truth: I64, path: Path) -> None:
     """Draw the reliability diagram of forecasts, as `draw_reliability`.
 
     Args:
-        name: What forecast them.
+        name: The name of the model that forecast.
         belief: float64 (n, places), the probability of each place.
         truth: int64 (n,), the true place.
         path: The file.
@@ -242,7 +242,7 @@ def draw_gaps(measures: GapMeasures, path: Path) -> None:
     """Draw measures of models of presence by the time since a person was last seen.
 
     Args:
-        measures: What is drawn, a panel for each measure.
+        measures: The measures, each drawn in a panel of its own.
         path: The file.
 
     Raises:
@@ -260,7 +260,7 @@ def draw_gaps(measures: GapMeasures, path: Path) -> None:
                 axes.set_xticks(range(len(gaps)), list(gaps), rotation=30)
             axes.set(ylabel=measure, xlabel="time since last seen")
             if max(mean for gaps in models.values() for mean, *_ in gaps.values()) > 1:
-                axes.set_yscale("log")  # the room of the last sighting is wrong by far
+                axes.set_yscale("log")  # the log loss of the last room seen is far larger
                 axes.yaxis.set_major_formatter("{x:g}")
         panels[0].legend(frameon=False)
         figure.tight_layout()

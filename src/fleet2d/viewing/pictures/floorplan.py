@@ -98,7 +98,7 @@ def draw_objects(plan: FloorPlan, axes: Axes) -> None:
 
 
 def _draw_glass(plan: FloorPlan, axes: Axes) -> None:
-    """Draw what is seen through, and not walked through, as glass in its walls."""
+    """Draw the parts of walls that block bodies but not sight as glass."""
     panes = shapely.difference(list(plan.glass), shapely.MultiPolygon(plan.polygons))
     glass = areas_of(shapely.transform(panes, plan.lattice.to_metres))
     _fill(glass, axes, facecolor=GLASS_COLOR, linewidths=0.5, zorder=1.7)
@@ -141,7 +141,7 @@ def points_per_m(axes: Axes) -> float:
 def _fit(space: tuple[float, float], width: float, height: float, most: float) -> tuple[float, int]:
     """Return the size of a text that fits into a space [points], and its rotation [degrees].
 
-    Its width and height are in multiples of its size. It is upright if it would be too small.
+    `width` and `height` are multiples of the size. The text is upright if it would be too small.
     """
     across, up = space
     flat = min(across / width, up / height)
@@ -226,7 +226,7 @@ def _swing_of(door: Doorway) -> F64:
 DATE_METADATA = MappingProxyType({".png": "Software", ".svg": "Date", ".pdf": "CreationDate"})
 SUFFIXES = tuple(DATE_METADATA)
 
-# Right and down, how far the shadow of walls falls [m]; the drawn pixels of a cell along its sides.
+# The offset of the shadow of walls to the right and down [m].
 SHADOW_M = (0.07, 0.1)
 SHADOW_COLOR = "#3c2d1938"
 JOINT_COLOR = "#6b7680"
@@ -239,7 +239,7 @@ DPI = 150
 MAX_FONT_PT = 9.0
 MIN_FONT_PT = 3.5
 SMALL_PT = 5.0
-# Width of a letter of the font as a share of its size; share of a room that its name may fill.
+# The share of a room that its name may fill.
 FILL = 0.9
 # The middle of a room consists of cells with at least this share of its greatest squared depth.
 MIDDLE_DEPTH = 0.9
@@ -288,7 +288,7 @@ def check_picture(path: Path) -> None:
     """Check that a file has the suffix of a picture.
 
     Raises:
-        InputError: It has another suffix.
+        InputError: The file has another suffix.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -302,13 +302,13 @@ def drawing_style() -> Iterator[None]:
     """Draw in the style of Fleet2D, whatever the user's settings."""
     style = {**mpl.rcParamsDefault, "svg.hashsalt": "fleet2d", "font.family": _fonts()}
     style.pop("backend")
-    with mpl.rc_context(style), _no_warning_of_each_letter():
+    with mpl.rc_context(style), _without_letter_warnings():
         yield
 
 
 @contextmanager
-def _no_warning_of_each_letter() -> Iterator[None]:
-    """Leave out Matplotlib's warnings of letters that no font has: `save_figure` warns of all."""
+def _without_letter_warnings() -> Iterator[None]:
+    """Silence Matplotlib's warnings of single missing letters: `save_figure` warns of all."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         yield
@@ -326,7 +326,7 @@ OTHER_FONTS = (
 
 @cache
 def _fonts() -> list[str]:
-    """Return the fonts of pictures: what the first one lacks is taken from the next ones."""
+    """Return the fonts of pictures: letters that the first lacks are taken from the next."""
     installed = get_font_names()
     return ["DejaVu Sans", *(name for name in OTHER_FONTS if name in installed)]
 
@@ -349,7 +349,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     """
     unstamped = {DATE_METADATA[path.suffix.lower()]: None}
     content = io.BytesIO()
-    with _no_warning_of_each_letter():
+    with _without_letter_warnings():
         figure.savefig(content, format=path.suffix[1:].lower(), metadata=unstamped)
     if letters := _letters_without_font(figure):
         warnings.warn(
@@ -456,7 +456,7 @@ def _draw_walls(plan: FloorPlan, axes: Axes) -> None:
 def _with_walls(plan: FloorPlan) -> BaseGeometry:
     """Return the free space and the walls around it [lattice]."""
     thickness = WALL_M * plan.lattice.units_per_m
-    # Without steps of a few centimetres in traced outlines, which look like notches in outer walls.
+    # Steps of a few centimetres in traced outlines would look like notches in outer walls.
     smooth = shapely.simplify(shapely.union_all(plan.polygons), thickness / 5)
     return shapely.buffer(smooth, thickness, join_style="mitre")
 
@@ -482,7 +482,8 @@ def _draw_rooms(plan: FloorPlan, axes: Axes) -> None:
 def floor_image(plan: FloorPlan) -> F64:
     """Return the floors of rooms, each of the material of its type: float64 (rows, columns, 3).
 
-    Each cell has several pixels; in homes so large that a pattern would be finer than a pixel, one.
+    Each cell has several pixels, or one in homes so large that patterns would be finer than a
+    pixel.
     """
     finer = FINER if plan.area_m2 <= MOST_PATTERNED_M2 else 1
     rooms = np.kron(_spread(plan.room_of_cell), np.ones((finer, finer), np.int16))
@@ -572,7 +573,7 @@ def _spread(room_of_cell: I16) -> I16:
 
 def _outline(plan: FloorPlan, polygons: Sequence[shapely.Polygon]) -> Outline:
     """Return polygons [lattice] as one path [m]."""
-    rings = shapely.get_rings(shapely.orient_polygons(polygons))  # holes the other way round
+    rings = shapely.get_rings(shapely.orient_polygons(polygons))  # holes must turn the other way
     corners = [plan.lattice.to_metres(shapely.get_coordinates(ring)) for ring in rings]
     return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in corners))
 
@@ -642,7 +643,7 @@ def _middle(cells: Bool) -> tuple[int, int]:
     rows, columns = np.nonzero(cells)
     top = int(rows.min())
     left = int(columns.min())
-    window = cells[top : rows.max() + 1, left : columns.max() + 1]  # small in a large home
+    window = cells[top : rows.max() + 1, left : columns.max() + 1]  # the rest costs time
     depth = squared_distance(np.pad(window, 1))[rows - top + 1, columns - left + 1]
     is_deep = depth >= MIDDLE_DEPTH * depth.max()
     rows = rows[is_deep]

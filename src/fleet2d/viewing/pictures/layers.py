@@ -77,7 +77,7 @@ def layer_on_axes(plan: FloorPlan, values: NDArray[Any], axes: Axes) -> ScalarMa
 
     Args:
         plan: The floor plan, already drawn.
-        values: (rows, columns); of bool, true cells are tinted, and there is no colour bar.
+        values: (rows, columns); if they are bool, true cells are tinted, without a colour bar.
         axes: The axes to draw on, in metres.
     """
     image = np.zeros((*values.shape, 4))
@@ -129,7 +129,7 @@ def parse_pose(text: str) -> CameraPose:
     """Return the pose of a text of three to five numbers.
 
     Raises:
-        InputError: The text has other numbers, or something else.
+        InputError: The text isn't three to five numbers, or one is out of range.
 
     Example:
         >>> parse_pose("2.5, 1, 90")

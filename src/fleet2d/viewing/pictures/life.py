@@ -171,7 +171,7 @@ LEGS = 1_500
 WALKED_STEPS = 4_000_000
 # Positions with a longer time between them are not connected by a line.
 MAX_LEG_GAP_US = 5_000_000
-# A position so near to the way between its neighbours is on it: somewhat more than rounding.
+# A position this near to the way between its neighbours is on it: a little more than rounding.
 STRAIGHT_M = 0.003
 NO_LEGS = np.zeros((0, 2, 2))
 
@@ -190,7 +190,7 @@ class BodyTrace:
         heading: The headings, float64 (n,) [rad].
         room: The index of the room, -1 while away, int16 (n,).
         legs: Straight pieces of its paths without duplicates, float64 (m, 2, 2) [m].
-        note: What the trace doesn't show exactly; empty if nothing.
+        note: A remark on what the trace doesn't show exactly; empty if there is none.
     """
 
     name: str
@@ -247,7 +247,7 @@ def _from_key_frames(run: Run, plan: FloorPlan, name: str, trace: NewTrace) -> B
 def _legs_of(run: Run, plan: FloorPlan, name: str) -> tuple[F64, str]:
     """Return the legs between the key frames of a body, and a remark if some are left out.
 
-    Of a random walk, the first `LEGS` legs are returned, and none of a long one.
+    For a random walk, the first `LEGS` legs are returned, or none if it is long.
     """
     keys = _rows(run, "key_frames", name, ("x", "y", "heading", "away"), "kind")
     if (keys["kind"] == "walk").any():
@@ -323,11 +323,11 @@ def _legs_between(xy: F64, away: Bool) -> F64:
 
 
 def _are_ends(xy: F64, state: F64) -> Bool:
-    """Return which positions aren't just passed on a straight way, as where a robot brakes.
+    """Return which positions end a straight way at constant state: bool (n,).
 
     Args:
         xy: Positions [m], float64 (n, 2).
-        state: What else differs at the ends of ways, (n, k).
+        state: Values that change only at the ends of ways: float64 (n, k).
     """
     to = xy[1:-1] - xy[:-2]
     on = xy[2:] - xy[1:-1]
@@ -346,7 +346,7 @@ REACH = 5  # radius of the blur [standard deviations]; with less, spots have squ
 MAX_OPACITY = 0.4  # the highest opacity of presence, at which the plan stays legible
 # Time, in multiples of the mean over all cells, at which presence has half of that opacity.
 HALF_OPACITY_TIME = 4.0
-MAX_LEGS = 3_000  # drawn of a body
+MAX_LEGS = 3_000  # legs drawn for a body
 CANDIDATES = 60  # moments to compare when a view is chosen
 # The number of places of sightings that are drawn, as more would hide the plan.
 MAX_PLACES = 260
@@ -364,7 +364,7 @@ class SightWalls:
 
     @classmethod
     def of(cls, home: Home) -> "SightWalls":
-        """Return those of a home as it is now."""
+        """Return the walls of a home as it is now."""
         return cls(home.walls, home.plan.lattice)
 
 
@@ -484,7 +484,7 @@ def draw_robot(xy: F64, heading: float, radius: float, color: str, axes: Axes) -
 
 
 def draw_kept_out(areas: Iterable[Any], color: str, axes: Axes) -> None:
-    """Hatch the areas that a robot keeps out of; of each its corners [m]."""
+    """Hatch the areas that a robot keeps out of, given by their corners [m]."""
     style: dict[str, Any] = {"facecolor": "none", "edgecolor": color, "hatch": "////", "lw": 0.8}
     for corners in areas:
         axes.add_patch(Polygon(corners, linestyle="--", alpha=0.6, zorder=2.5, **style))
@@ -521,8 +521,8 @@ def best_view(
 ) -> CameraView | None:
     """Return the moment that shows best what a robot sees, and what walls hide from it.
 
-    It is the moment with the largest visible area that a wall limits; a moment with a user in view,
-    if there is any.
+    That is the moment with the largest visible area that a wall limits, of those with a user in
+    view if there are any.
 
     Args:
         plan: The home.

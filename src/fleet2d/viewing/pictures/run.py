@@ -55,7 +55,7 @@ MARKS = 288
 GAPS_UP_TO = 75  # days; of longer runs, rows have no gaps between them
 # The height of a mark where somebody was seen all the time, as a share of the row.
 MARK_PART = 0.5
-# The minimum height of a mark, as a share of that: a single sighting is visible.
+# The minimum height of a mark, as a share of `MARK_PART`: a single sighting is visible.
 MIN_MARK_HEIGHT = 0.06
 
 NOT_SIMULATED = -2
@@ -69,7 +69,7 @@ def rooms_by_day(trace: BodyTrace, start: datetime, step_us: int, steps: int) ->
     readings_us = midnight_us + np.arange(days * BINS) * (DAY_US // BINS)
     begins = readings_us - stamp_us(start)
     is_read = True
-    if isinstance(start, LocalTime):  # of an hour that the clock reads twice, the first counts
+    if isinstance(start, LocalTime):  # an hour that the clock reads twice counts once
         begins = start.zone.moments(readings_us) - start.utc_us
         is_read = readings_of(start, begins) == readings_us
     ends = begins + DAY_US // BINS
@@ -204,7 +204,7 @@ def _dated_rows(start: datetime, days: int) -> tuple[list[float], list[str]]:
 
 MAX_BODIES = 4  # users with an actogram, and robots
 
-# Inches.
+# Sizes of the picture [in].
 WIDTH = 10.67  # the largest; with a narrow plan the picture is narrower
 EDGE = 0.32
 HEADER = 0.82
@@ -241,8 +241,8 @@ class PlottedObservations:
 def draw_run(run: Run, path: Path) -> None:
     """Draw a run to a PNG, SVG or PDF file; the same run gives the same bytes.
 
-    Left is the floor plan with the presence and paths of bodies and what robots saw; right an
-    actogram for each user, of at most four: a row per day, coloured by room.
+    On the left is the floor plan with the presence and paths of bodies and the sightings of robots,
+    on the right an actogram for each of at most four users: a row per day, coloured by room.
 
     Args:
         run: A run, stored or in memory, complete or interrupted.
