@@ -325,10 +325,9 @@ class Cameras(Watcher):
     @property
     def ends(self) -> tuple[bool, bool]:
         """Whether a span ends at USER_LOST, when a body is lost, and at USER_SEEN."""
-        plan = self.owner.plan.interrupts
-        awaited = self.awaited
-        lost, seen = (name in plan or name in awaited for name in self.event_names)
-        return lost, seen
+        heard = self.awaited | self.owner.plan.interrupts
+        lost, seen = self.event_names
+        return lost in heard, seen in heard
 
     @property
     def waits(self) -> bool:
@@ -405,12 +404,12 @@ class Cameras(Watcher):
         if not events:
             return
         stops = self.owner.plan.interrupts
-        lattice = self.owner.home.lattice
+        xy_of = self.owner.home.lattice.xy_of
         identities = self.identities
         for event in events:
             if event.step == self.next_step - 1 and event.event in stops:
                 identity = identities.get(event.detail, NOBODY)
-                x, y = lattice.to_metres(self.perceived[identity]).tolist()
+                x, y = xy_of(*self.perceived[identity].tolist())
                 yield self.row, SightEvent(event.event, event.detail, x, y)
 
     def collect(self) -> SightingTable:
