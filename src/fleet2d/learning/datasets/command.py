@@ -1,4 +1,4 @@
-"""`fleet2d dataset`: data sets are made, verified, trained on, and scored."""
+"""The commands `fleet2d dataset make`, `verify`, `train` and `score`."""
 
 import json
 import time
@@ -65,7 +65,7 @@ def verify(directory: Folder) -> None:
 
 
 def _make(source: Path, out: Path, workers: int | None) -> None:
-    """Make a data set, or what it lacks."""
+    """Make a data set, or the files that it lacks."""
     from fleet2d.learning.datasets.generate import dataset as make
 
     _print_size(make(source, out, workers=workers))

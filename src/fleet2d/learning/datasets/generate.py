@@ -84,7 +84,7 @@ def write_card(data: Dataset, file: DatasetFile, left_out: Sequence[str] = ()) -
     Args:
         data: The data set.
         file: Its file.
-        left_out: What its conditions left out, a line for each split.
+        left_out: The lives that its conditions left out, a line for each split.
     """
     root = data.root
     counts = {split: _count(data, split) for split in data.splits}
@@ -133,7 +133,7 @@ def _columns_of(table: str) -> str:
 
 
 def _count(data: Dataset, split: str) -> dict[str, Any]:
-    """Return how much there is in a split, and how it is distributed."""
+    """Return the size of a split, and the distribution of its values."""
     runs = data.arrow("runs", split)
     labels = data.arrow("labels", split).group_by(["run", "place"], use_threads=False)
     rooms = {
@@ -223,10 +223,10 @@ def _bars(figure: "Figure", counts: Mapping[str, Mapping[str, Any]], name: str) 
 
 
 PLAN = "plan.txt"
-UNFIT = "unfit"  # the runs that are left out
+UNFIT = "unfit"  # the file with the runs that are left out
 # The number of reasons that an error lists.
 MAX_REASONS = 20
-# Runs that are planned at a time: they are what a data set of any size keeps in memory.
+# The number of runs planned at a time, which a data set of any size keeps in memory.
 BLOCK_RUNS = 512
 
 
@@ -237,7 +237,7 @@ def dataset(
     workers: int | None = None,
     executor: ExecutorName | Executor = "local",
 ) -> Dataset:
-    """Make a data set, the rest of one that was interrupted, or files that it lacks, and open it.
+    """Make a data set or the files that it lacks, such as after an interruption, and open it.
 
     Its content is the same for any number of workers, and after an interruption.
 
@@ -249,7 +249,7 @@ def dataset(
 
     Raises:
         InputError: The file is wrong, its splits overlap, the folder holds something else, or
-            files that are lacking can't be made again as they were.
+            missing files can't be made again as they were.
         ComponentError: A run failed.
 
     Example:
@@ -345,7 +345,7 @@ def _identity(plan: DatasetPlan) -> bytes:
 
 
 def _check_plan(parts: Path, plan: DatasetPlan) -> None:
-    """Refuse to continue a data set of another file or version; begin one."""
+    """Refuse to continue a data set of another file or version; begin a new one."""
     path = parts / PLAN
     has_runs = any(parts.glob("*.arrow")) or any(parts.glob("*-*.json"))
     if path.is_file() and read_bytes(path, FILE_BYTES) != _identity(plan) and has_runs:
@@ -416,7 +416,7 @@ def _set_up(
 
 
 def set_up_problem(task: FunctionTask) -> str:
-    """Set a run up in a worker process; return why that fails, empty if it doesn't."""
+    """Set a run up in a worker process; return why it fails, or an empty text."""
     try:
         check_setup(load_scenario(task.scenario))
     except Fleet2DError as error:
@@ -427,7 +427,7 @@ def set_up_problem(task: FunctionTask) -> str:
 def _write_shards(
     root: Path, plan: DatasetPlan, workers: int | None, executor: ExecutorName | Executor
 ) -> dict[str, ShardRecord]:
-    """Simulate the runs that are lacking, block by block; return the record of each file."""
+    """Simulate the missing runs, block by block; return the record of each file."""
     records = {shard: _record_of(root, shard) for shard in plan.shards()}
     lacking = [shard for shard, record in records.items() if not record]
     size = max(1, BLOCK_RUNS // plan.file.runs_per_shard)
@@ -488,7 +488,7 @@ def _part_path(root: Path, run: PlannedRun) -> Path:
 def write_part(
     root: Path, planned: Mapping[int, PlannedRun], labels: timedelta, run: "Run"
 ) -> None:
-    """Write what a data set stores of a run, in the process that simulated it.
+    """Write the tables of a run that a data set stores, in the process that simulated it.
 
     The tables come one after the other, as streams of one file.
 
@@ -541,8 +541,8 @@ def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, Sha
 def _encoding(table: pa.Table) -> dict[str, Any]:
     """Return how a table is stored: steps and times as differences, texts by their values.
 
-    Most rows follow the one before by the same time, so this takes a third less room. The values of
-    a belief hardly repeat: their bytes are stored one place after the other.
+    Steps mostly grow by the same amount, so this takes a third less room. Beliefs hardly repeat:
+    their bytes are stored plane by plane.
     """
     columns = table.column_names
     moments = {"step", "next_step", "time"}.intersection(columns)
@@ -555,8 +555,8 @@ def _encoding(table: pa.Table) -> dict[str, Any]:
             **dict.fromkeys(beliefs, "BYTE_STREAM_SPLIT"),
         },
         "use_dictionary": [name for name in columns if name not in moments | beliefs],
-        "write_statistics": ["run", "step"],  # by which readers leave out parts of a file
-        "store_schema": False,  # that of the dictionaries: readers get texts
+        "write_statistics": ["run", "step"],  # readers skip parts of a file by them
+        "store_schema": False,  # it would give readers dictionaries in place of texts
     }
 
 

@@ -37,7 +37,7 @@ class ShardRecord(FileRecord):
 
 
 def _check_files(files: dict[str, ShardRecord]) -> dict[str, ShardRecord]:
-    """Refuse files that aren't those of whole shards: each has a file of every table."""
+    """Refuse shards that lack the file of a table."""
     shards = {(name.partition("/")[0], name[-13:]) for name in files}
     if len(files) != len(shards) * len(SCHEMAS):
         raise ValueError("a shard lacks the file of a table")
@@ -50,10 +50,10 @@ class DatasetManifest(Record):
     Attributes:
         format: Version of the layout.
         name: The name of the data set.
-        plan: The digest of all that its content depends on, but the code.
+        plan: The digest of all inputs on which its content depends, without the code.
         versions: Versions of the software that made it.
         splits: The number of runs of each split.
-        unfit: Why each run was left out whose people don't fit into their home, by number.
+        unfit: Why runs were left out whose people don't fit into their home, by number.
         file: The file that it was made from, as plain data.
         files: Each file: its rows, size and digest.
     """
@@ -83,12 +83,12 @@ class Dataset:
     """
 
     def __init__(self, root: Path, manifest: DatasetManifest) -> None:
-        """Read nothing yet; `open_dataset` opens a data set."""
+        """Wrap a folder; use `open_dataset` to open a data set."""
         self.root = root
         self.manifest = manifest
 
     def __repr__(self) -> str:
-        """Return its folder and splits."""
+        """Return the folder and the splits."""
         splits = ", ".join(f"{name} {runs}" for name, runs in self.manifest.splits.items())
         return f"<Dataset {self.root}: {splits} runs>"
 
@@ -131,7 +131,7 @@ class Dataset:
         return len(self.files("runs", split))
 
     def shard(self, split: str, number: int) -> "dict[str, pa.Table]":
-        """Return the tables of some runs of a split, by name: of those in one file of each.
+        """Return the tables of one shard of a split, by name.
 
         Raises:
             InputError: There is no such split, or a file is damaged.
@@ -158,7 +158,7 @@ class Dataset:
         return [name for name in self.manifest.files if not path_in(self.root, name).is_file()]
 
     def verify(self) -> list[str]:
-        """Return the names of the files that are missing or differ from what was written.
+        """Return the names of the files that are missing or differ from the manifest.
 
         Raises:
             InputError: A file is a link, a device or a pipe.
@@ -191,7 +191,7 @@ def _read(path: Path, table: str) -> "pa.Table":
 
 
 def _problem(content: "pa.Table", schema: "pa.Schema") -> str:
-    """Return what is wrong with the columns and values of a table; empty if nothing is."""
+    """Return the first problem of the columns and values of a table; empty if there is none."""
     import pyarrow as pa
 
     if content.schema.names != schema.names or content.schema.types != schema.types:
@@ -210,7 +210,7 @@ def open_dataset(directory: str | Path) -> Dataset:
     """Open a data set.
 
     Raises:
-        InputError: There is none, it is of another version, or its manifest is damaged.
+        InputError: There is no data set, or it is damaged or of another version.
     """
     root = Path(directory)
     path = path_in(root, MANIFEST)

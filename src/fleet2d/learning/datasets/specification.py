@@ -35,7 +35,7 @@ from fleet2d.studies.lives import (
 )
 from fleet2d.studies.population import LifeFinder, left_out_words
 
-# folders beside those of the splits
+# The folders of a data set beside those of its splits.
 PARTS = "unfinished"
 PICTURES = "pictures"
 EVIDENCE = "evidence"
@@ -45,7 +45,7 @@ MAX_PERIOD = timedelta(days=1)
 
 
 class SplitSettings(DrawSettings):
-    """The runs of one split, and what they are drawn from.
+    """The runs of one split, and the source of their draws.
 
     Attributes:
         runs: The number of runs.
@@ -60,11 +60,11 @@ class SplitSettings(DrawSettings):
 
 
 class DatasetFile(Settings):
-    """A data set: what its runs are drawn from, and what is stored of them.
+    """A data set: the sources of its runs, and the tables that are stored of them.
 
     Attributes:
         name: Its name, the title of the data card.
-        description: What it is for.
+        description: Its purpose.
         licence: The licence of its content, stated on the data card.
         base: A scenario: a file, bundled:NAME, or its sections. Its users are replaced.
         seed: The seed of all draws.
@@ -146,11 +146,11 @@ class DatasetPlan:
     Attributes:
         file: The settings.
         base: The scenario that all runs share.
-        draws: What the runs of each split are drawn from.
+        draws: The draws of the lives of each split.
         numbers: The numbers of the lives of each split that meet its conditions.
-        left_out: How many lives didn't, and why, and remarks on tables, a line for each.
+        left_out: How many lives were left out, and why, and remarks on tables, a line for each.
         unfit: The runs that are left out, as they can't be set up, and why, by number.
-        inputs: Hashes of the files that it is made from beside its own, in order.
+        inputs: Hashes of the other files that it is made from, in order.
     """
 
     file: DatasetFile
@@ -163,7 +163,7 @@ class DatasetPlan:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of all that its content depends on, but the code of Fleet2D."""
+        """SHA-256 of all inputs on which its content depends, without the code of Fleet2D."""
         homes = {}
         for name, draw in self.draws.items():
             homes[name] = [home.changes for home in draw.homes]
@@ -181,7 +181,7 @@ class DatasetPlan:
         return [self.run(shard.split, k) for k in shard.runs]
 
     def shards(self) -> Iterator[Shard]:
-        """Yield the shards of all splits, but those without a fit run."""
+        """Yield the shards of all splits, except those without any fit run."""
         size = self.file.runs_per_shard
         for split, settings in self.file.splits.items():
             offset = self._first_number(split)
@@ -199,7 +199,7 @@ class DatasetPlan:
     def run(self, split: str, k: int) -> PlannedRun:
         """Draw run k of a split: homes are taken in turn, the rest is drawn at random."""
         lives = self.numbers[split]
-        # Fresh runs have no end: then with further lives, or those that meet the conditions again.
+        # Fresh runs never end: they go on to further lives or, with conditions, repeat those found.
         drawn = lives[k % len(lives)] if self.file.splits[split].where else k
         life = self.draws[split].life(drawn)
         number = self._first_number(split) + k
@@ -212,7 +212,7 @@ class DatasetPlan:
         """Check each household, home and varied value in a scenario, before the first run.
 
         Returns:
-            Hashes of what files make of these scenarios, such as personas, in order.
+            Hashes of the content that files add to these scenarios, such as personas, in order.
 
         Raises:
             InputError: A scenario would be wrong.
@@ -324,7 +324,7 @@ def _period(simulation: Mapping[str, Any]) -> timedelta:
 
 
 def _origins(user: Any) -> set[str]:
-    """Return what a user has in common with users of the same persona, however that is changed."""
+    """Return the names of the personas and logs from which a user comes, however changed."""
     persona = user.get("persona") if isinstance(user, Mapping) else None
     return origins_of(persona) if persona else set(personas_of({"": user}))
 
@@ -333,7 +333,7 @@ def _check_splits(file: DatasetFile, homes: Mapping[str, list[Choice]]) -> None:
     """Refuse splits that share a home, a household or a persona.
 
     Raises:
-        InputError: They do; the message names what they share.
+        InputError: Splits overlap; the message names what they share.
     """
     people: dict[str, set[str]] = {}
     plans: dict[str, dict[str, str]] = {}

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 OFFSET = "utc_offset_min"
-"""The column that tells by how many minutes local time is ahead of UTC: in the hour that a change
-of clocks doubles, `time` alone doesn't say which of two moments is meant."""
+"""The minutes by which local time is ahead of UTC: in the hour that a change of clocks doubles,
+`time` alone is ambiguous."""
 MINUTE = np.timedelta64(1, "m")
 _KINDS: Mapping[str, pa.DataType] = {
     **dict.fromkeys(("run", "step", "next_step"), pa.int32()),
@@ -75,7 +75,7 @@ def tables_of(run: "Run", planned: PlannedRun, labels: timedelta) -> dict[str, p
 
     Args:
         run: The run, in memory or stored.
-        planned: What was planned for it.
+        planned: The plan of the run.
         labels: Time between labels.
     """
     manifest = run.manifest
@@ -150,7 +150,7 @@ def columns_of(run: "Run", name: str, columns: Sequence[str]) -> dict[str, Any]:
 
 
 def _labels(run: "Run", user: str, steps: I64) -> dict[str, Any]:
-    """Return where a user truly was at some steps, where next and when, and what the user did.
+    """Return the true place and activity of a user at some steps, and the next place and its step.
 
     Steps at which nobody knows, as in the gaps of a log, are left out.
     """
@@ -198,10 +198,10 @@ def _belief(run: "Run", name: str) -> dict[str, Any]:
     """Return the rows of the belief of a model about each user."""
     rows = run.arrow(name)
     rows = rows.filter(number_array(values_of(rows["user"]) != ANYONE, pa.bool_()))
-    places = len(run.plan.rooms) + 1  # away last
+    places = len(run.plan.rooms) + 1  # the last place is away
     share = values_of(rows["share"]).reshape(-1, places).copy()
-    share[:, :-1] *= 1 - share[:, -1:]  # of all time, not given at home
-    at = "at" if "at" in rows.column_names else "step"  # of `belief_table`, of `rtp`
+    share[:, :-1] *= 1 - share[:, -1:]  # shares of all time rather than of time at home
+    at = "at" if "at" in rows.column_names else "step"  # only `belief_table` has `at`
     return {
         "step": values_of(rows[at]),
         "model": text_array([name.removeprefix(BELIEF)], np.zeros(len(rows), np.int64)),

@@ -42,10 +42,10 @@ TRAIN = "train"
 Scores = dict[str, tuple[dict[str, float], int]]
 """By model: its numbers by metric, and the number of cases that were scored."""
 TUNED = "learned, tuned"
-SMOOTHING = 1.0  # added to each count of a baseline
-# The number of parts of a split that are scored each.
+SMOOTHING = 1.0  # the pseudocount of each outcome in a baseline
+# The largest number of parts of a split that are scored apart.
 MAX_PARTS = 20
-# of an interval: what its ends are named, after the name of what they enclose
+# The suffixes of the names of an interval's ends.
 LOWER_END = " lower end"
 UPPER_END = " upper end"
 
@@ -55,7 +55,7 @@ class LeaderboardEntry(NamedTuple):
 
     Attributes:
         task: The task.
-        model: What was scored.
+        model: The name of the model.
         scores: Numbers by metric.
         cases: Number of scored cases.
     """
@@ -74,7 +74,7 @@ def windows(data: Dataset, split: str, worker: int = 0, workers: int = 1) -> Ite
         split: The split.
         worker: Which of the workers this is, from 0 on: it gets each shard whose number is `worker`
             modulo `workers`.
-        workers: Among how many the shards are shared.
+        workers: The number of workers that share the shards.
     """
     for number in range(worker, data.shards(split), workers):
         with _agreeing(data, split):
@@ -86,7 +86,7 @@ def _agreeing(data: Dataset, split: str) -> Iterator[None]:
     """Refuse a data set whose tables don't fit together, such as a label in a room without a row.
 
     Raises:
-        InputError: What is computed in the block failed, as it can't with the tables of a run.
+        InputError: A computation in the block failed, as none does with the tables of a run.
     """
     place = f"{data.root}: its tables of {split!r} don't fit together, make the data set again"
     with errors_as(InputError, place, of=(ArithmeticError, LookupError, ValueError)):
@@ -94,12 +94,12 @@ def _agreeing(data: Dataset, split: str) -> Iterator[None]:
 
 
 class Networks(NamedTuple):
-    """What `rtp` scores beside the stored beliefs, and the shipped network.
+    """The networks that `rtp` scores beside the stored beliefs and the shipped network.
 
     Attributes:
         models: Further networks, by name.
-        tune: Days of each person by which the shipped network is tuned, too, and which nothing is
-            scored on.
+        tune: The number of days of each person on which a copy of the shipped network is tuned, and
+            nothing is scored.
     """
 
     models: Mapping[str, Weights] = {}
@@ -121,7 +121,7 @@ def leaderboard(
         data: The data set.
         tasks: Names of tasks; none: all.
         split: The split to score on.
-        networks: What `rtp` scores, too.
+        networks: Further networks that `rtp` scores.
 
     Raises:
         InputError: There is no such task or split, or networks are tuned without torch.
@@ -180,7 +180,7 @@ class SplitForecasts(NamedTuple):
         truth: int64 (n,), the place where the person was.
         gap: float64 (n,), minutes since the newest sighting.
         home: str (n,), the home.
-        parts: By household, and by value of what was varied: bool (n,), where it is.
+        parts: The windows of each household and of each varied value: bool (n,).
     """
 
     beliefs: Mapping[str, F64]
@@ -194,7 +194,7 @@ class SplitForecasts(NamedTuple):
 
         Args:
             values: float64 (n,).
-            own: bool (n,), which of them count.
+            own: bool (n,), the windows that count.
         """
         homes, number = np.unique(self.home[own], return_inverse=True)
         means = np.bincount(number, values[own]) / np.bincount(number)
@@ -262,9 +262,9 @@ def _score_rtp(data: Dataset, split: str, networks: Networks) -> Scores:
 
 
 def _difference(made: SplitForecasts, name: str) -> dict[str, float]:
-    """Return log loss by household and by what was varied, and its difference to `routine`.
+    """Return log loss by household and by varied value, and its difference to `routine`.
 
-    The difference has an interval over homes, and is told over all windows and by gap.
+    The difference is that over all windows and by gap, with its interval over homes.
     """
     loss = log_loss(made.beliefs[name], made.truth)
     prior = log_loss(made.beliefs[PRIOR], made.truth)
@@ -334,7 +334,7 @@ def _score_ltp(data: Dataset, split: str, _: object) -> Scores:
 
 
 def _next_rooms(labels: Mapping[str, Any]) -> Iterator[tuple[Hashable, str]]:
-    """Yield for each stay the kind of its place, and that of the next one."""
+    """Yield the kind of the place of each stay, and the kind of the next place."""
     following = labels["next_step"].astype(float)
     is_last = np.append(following[1:] != following[:-1], True) & ~np.isnan(following)
     yield from zip(labels["kind"][is_last], labels["next_kind"][is_last], strict=True)
@@ -389,7 +389,7 @@ def _score_time_to_return(data: Dataset, split: str, _: object) -> Scores:
 def _score_shares(
     data: Dataset, split: str, _: object, cases: Callable[[Any], Iterable[Any]], given: str
 ) -> Scores:
-    """Score the shares of each outcome in the training: overall, and given what is known."""
+    """Score the training's shares of each outcome: overall, and given what is known."""
     known = [*chain.from_iterable(map(cases, labels_by_person(data, TRAIN)))]
     asked = [*chain.from_iterable(map(cases, labels_by_person(data, split)))]
     if not known or not asked:

@@ -29,7 +29,7 @@ def torch_windows(data: Dataset, split: str, *, shuffle: int = 0, seed: int = 0)
         data: The data set.
         split: The split.
         shuffle: Size of the buffer from which windows are drawn; 0: in order.
-        seed: Of the order.
+        seed: The seed of the order.
 
     Example:
         >>> windows = torch_windows(data, "train", shuffle=1000)  # doctest: +SKIP
@@ -47,13 +47,13 @@ def fresh_windows(
         source: The file of a data set, or the same as a mapping.
         split: The split whose homes and households are used.
         shuffle: Size of the buffer from which windows are drawn; 0: in order.
-        seed: Of the order, and of the runs.
+        seed: The seed of the order and of the runs.
     """
     return TorchWindows(partial(_fresh, source, split, seed), shuffle, seed)
 
 
 class TorchWindows(IterableDataset):  # type: ignore[misc]
-    """Windows as mappings of tensors: places, features, truth and belief, as `Windows` has them.
+    """Windows as mappings of tensors: places, features, truth and belief, as in `Windows`.
 
     Homes differ in the number of places: batch windows of one home, or pad them.
     """
@@ -109,7 +109,7 @@ def _fresh(
     number = worker
     while True:
         planned = plan.run(split, number)
-        # Seeds of the data set itself are below those of fresh runs.
+        # Fresh runs have larger seeds than the data set itself.
         simulation = {
             **planned.scenario["simulation"],
             "seed": (1 << 31) + seed * 1_000_003 + number,

@@ -1,4 +1,4 @@
-"""Training of the network of `model: learned`, by PyTorch; what is trained runs without it."""
+"""Training of the network of `model: learned` by PyTorch; the network runs without it."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -20,25 +20,25 @@ with extra("ml", "training a network needs torch"):
 FLOOR = 1e-6
 # The factors of the correction that fine-tuning tries.
 FACTORS = tuple(k / 10 for k in range(16))
-CAUTION = 0.05  # log loss that a factor of 0 or of 2 must gain
-# By gap: lowest log loss for simulated people who were left out, a persona at a time.
+CAUTION = 0.05  # gain in log loss required of a factor of 0 or 2
+# By gap, the trust with the lowest log loss for personas left out of the training, one at a time.
 TRUST = (1.0, 0.9, 0.85, 0.8, 0.75, 0.55)
 
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """How a network is trained.
+    """The settings of the training of a network.
 
     Attributes:
         hidden: Width of its layers.
-        epochs: How often each window is used.
-        batch: Windows of a step.
+        epochs: The number of times that each window is used.
+        batch: The number of windows of a step.
         rate: The largest learning rate, which rises for a tenth of the steps and falls to 0.
         decay: Weight decay; with `start`, the pull back to the weights at the beginning.
-        seed: Of the initial weights, and of the order of the windows.
+        seed: The seed of the initial weights, and of the order of the windows.
         trust: The share of the learned correction that is used in the end, by the gap since the
-            newest sighting. People differ from those of the training: these are best for personas
-            that were left out of it.
+            newest sighting. As people differ from those of the training, the defaults are best for
+            personas left out of it.
     """
 
     hidden: int = 32
@@ -75,7 +75,7 @@ Parameters = dict[str, Any]
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Compute on one thread of the processor, whatever PyTorch is set to elsewhere.
+    """Compute on one thread of the processor, whatever the settings of PyTorch.
 
     One thread adds in the same order each time, and more gain nothing with so few weights.
     """
@@ -102,9 +102,9 @@ def train(
 
     Args:
         training: The windows to learn from.
-        validation: Windows whose log loss is told after each epoch. It stops nothing: the few
-            people of a validation are no guide to which epoch is best for others.
-        settings: How it is trained.
+        validation: Windows whose log loss is reported after each epoch. It doesn't stop the
+            training: the few people of a validation are no guide to the best epoch for others.
+        settings: The settings of the training.
         start: Weights to begin with, for fine-tuning; None: random ones.
         on_epoch: Called with the epoch, and the log losses of training and validation.
 
@@ -119,7 +119,7 @@ def train(
     for batch in [*batches, *checks]:
         batch.inputs.sub_(mean).div_(scale)
     random = torch.Generator().manual_seed(settings.seed)
-    # What is trained is the difference to the anchor, so the decay of weights pulls back to it.
+    # The difference to the anchor is trained, so that the decay of weights pulls back to it.
     if start is None:
         change = _initial(random, settings.hidden)
         anchor = {name: torch.zeros_like(value) for name, value in change.items()}
@@ -157,7 +157,7 @@ def train(
 
 
 def fine_tune(weights: Weights, windows: Iterable[Windows]) -> Weights:
-    """Return weights fitted to a few days of one home, which stay near those they begin with.
+    """Return weights fitted to a few days of one home, near those given.
 
     What matters most is how far to trust the correction: the factor of its scores that is best on
     these days, with a penalty for factors far from 1. The weights are then trained a little.
@@ -176,7 +176,7 @@ def fine_tune(weights: Weights, windows: Iterable[Windows]) -> Weights:
 
 
 def _batches(parts: Iterable[Windows], size: int) -> list[WindowBatch]:
-    """Return batches of windows of homes with as many places, in a fixed random order."""
+    """Return batches of windows with equal numbers of places, in a fixed random order."""
     batches = []
     for places, group in sorted(joined(parts).items()):
         inputs_of_homes = []
@@ -213,7 +213,7 @@ def _initial(random: Any, hidden: int) -> Parameters:
         "second": normal(hidden, hidden),
         "context": normal(hidden, hidden) / 2,
         "bias": torch.zeros(hidden, dtype=torch.float32),
-        # So it begins with the belief that it corrects.
+        # Scores of 0 leave the belief as it is.
         "score": torch.zeros(hidden, dtype=torch.float32),
     }
 
@@ -232,7 +232,7 @@ def _losses(values: Parameters, batch: WindowBatch, trust: Any) -> Any:
 
 
 def _told(losses: Any) -> Any:
-    """Return log losses as people are told them: at most that of `FLOOR`."""
+    """Return log losses for reports: at most that of `FLOOR`."""
     return losses.detach().clamp(max=-log(FLOOR))
 
 

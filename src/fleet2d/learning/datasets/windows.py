@@ -41,11 +41,11 @@ class Windows(NamedTuple):
 
     Attributes:
         run: The number of the run.
-        home: Its home, by name.
-        labels: Its household, and what was varied, such as "robot=hangout".
+        home: The name of its home.
+        labels: Its household and varied values, such as "robot=hangout".
         user: The user.
-        places: float64 (places, PLACE_FEATURES), what doesn't change, away last.
-        features: float32 (windows, places, TRACE_FEATURES), what is known of each place.
+        places: float64 (places, PLACE_FEATURES), the constant features of each place, away last.
+        features: float32 (windows, places, TRACE_FEATURES), the evidence on each place.
         truth: int64 (windows,), the place where the user was; the last is away.
         step: int64 (windows,), the step of each window.
         day: int64 (windows,), its day, as `date.toordinal` counts.
@@ -65,7 +65,7 @@ class Windows(NamedTuple):
 
     @property
     def gap(self) -> F64:
-        """Minutes since the newest sighting, 2,880 for longer ago, or never: float64 (windows,)."""
+        """Minutes since the newest sighting, at most 2,880, also for never: float64 (windows,)."""
         return np.expm1(self.features[:, -1, GAP].astype(np.float64)).round(1)
 
     def rows(self, own: Bool | slice) -> "Windows":
@@ -128,7 +128,7 @@ def windows_of_run(run: "Run") -> list[Windows]:
 
 
 class _Dense:
-    """The evidence of a run as arrays by bin and room, and what is known of its home."""
+    """The evidence of a run as arrays by bin and room, and the facts of its home."""
 
     def __init__(
         self,
@@ -239,7 +239,7 @@ def _array(column: Any) -> Any:
     if not pa.types.is_dictionary(column.type):
         return column.to_numpy()
     whole = column.combine_chunks()
-    names = np.array([*whole.dictionary.to_pylist(), None], object)  # the last, at -1, is null
+    names = np.array([*whole.dictionary.to_pylist(), None], object)  # the index -1 is null
     return names[whole.indices.fill_null(-1).to_numpy()]
 
 

@@ -174,7 +174,7 @@ class ProductLikelihood:
         limit = float((self.upper if side > 0 else self.lower)[index])
         free = np.ones(len(best.theta), bool)
         free[index] = False
-        theta = best.theta  # of the last value tried, from which the next search starts
+        theta = best.theta  # the next search starts from that of the last value tried
 
         @cache  # in small logs, another start may end at another maximum
         def excess(value: float) -> float:

@@ -74,7 +74,7 @@ def read_detections(path: Path) -> DetectionLog:
 
     It has the columns `distance` [m] and `detected` (0 or 1); it may have `bearing_deg` or
     `bearing_rad`, `orientation_deg` or `orientation_rad`, and `identity` with `true_identity`.
-    Others are ignored.
+    Other columns are ignored.
 
     Raises:
         InputError: The file can't be read, lacks a column, or has a wrong value; the message names
@@ -195,7 +195,7 @@ class FittedProbability:
 
     @property
     def chi_square(self) -> float:
-        """The statistic of Hosmer and Lemeshow: how far observed and predicted are apart."""
+        """The statistic of Hosmer and Lemeshow: the distance of observed from predicted numbers."""
         return sum_in_order(
             group.rows * (group.observed.value - group.predicted) ** 2
             / max(group.predicted * (1 - group.predicted), 1e-12)
@@ -209,7 +209,7 @@ class FittedProbability:
 
 
 class Recognition(NamedTuple):
-    """How users are recognized.
+    """The fitted recognition of users.
 
     Attributes:
         right: The probability of being recognized, by distance.
@@ -229,7 +229,7 @@ class Calibration:
     Attributes:
         log: The log.
         detection: The probability of being noticed.
-        identity: How users are recognized; None if the log doesn't show it.
+        identity: The recognition of users; None if the log doesn't show it.
         notes: Remarks for the report.
     """
 
@@ -241,7 +241,7 @@ class Calibration:
     def section(self) -> dict[str, Any]:
         """Return the `perception` section of a scenario.
 
-        It has the whole probability of detection: set the camera's own `detection` to 1 beside it.
+        The section holds the whole probability of detection: set the camera's `detection` to 1.
         """
         estimates = self.detection.estimates
         detection: dict[str, Any] = {"distance": _curve(estimates, "distance")}
@@ -322,7 +322,7 @@ def group_rows(shares: F64, outcomes: Bool) -> list[ProbabilityGroup]:
 
 
 def _fit_identity(log: DetectionLog, notes: list[str]) -> Recognition | None:
-    """Fit how users are recognized, if the log has identities; else add a note."""
+    """Fit the recognition of users if the log has identities; else add a note."""
     if log.identity is None or log.true_identity is None:
         return None
     true = log.true_identity[log.detected]

@@ -29,7 +29,7 @@ from fleet2d.routines.planner import NO_SLEEP_S, RecordedDay, parse_day, write_d
 from fleet2d.runtime.clock import DAY_S
 
 QUANTILES = 21  # maximum number of quantiles of a law of durations
-# Words of activities that are done standing, lying and sitting; the first that fit decide.
+# Words in names of activities for standing, lying and sitting; the first match counts.
 STAND = ("cook", "prepar", "wash", "dish", "clean", "transition", "hygiene", "bathing")
 LIE = ("sleep", "nap", "bed", "wake_up")
 SIT = (
@@ -77,9 +77,9 @@ def fit_persona(
 ) -> FittedPersona:
     """Fit a persona to days of a log.
 
-    Its days are drawn from those of the log, and switch from one to another where both have the
-    same activity at about the same time. If it is private, it has days that are like those of the
-    log instead (see `private_days`), and no measured durations.
+    Its days are drawn from those of the log, switching between days that have the same activity at
+    about the same time. A private persona has days like those of the log instead (see
+    `private_days`), and no measured durations.
 
     Raises:
         LogError: There are no days to fit.
@@ -110,7 +110,7 @@ def fit_persona(
     document = {
         "about": about or f"fitted to {len(days)} days of a log",
         "activities": activities,
-        "needs": {},  # their activities are in the log
+        "needs": {},  # the log has their activities
         "errands": {},
         "days": templates,
     }
@@ -135,16 +135,16 @@ def _kinds_of_days(
     return {"weekday": ("weekdays", weekdays), "weekend": ("weekend", weekend)}, []
 
 
-# What nearly every home has; the kinds of days of a week.
+# The places that nearly every home has.
 USUAL_PLACES = ("bathroom", "bedroom", "kitchen", AWAY)
-MUCH_UNKNOWN = 0.05  # share of the time
+MUCH_UNKNOWN = 0.05  # a larger share of unknown time is reported
 
 
 def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
-    """Return what isn't in a log, and what that means for a persona that is fitted to it."""
+    """Return what a log lacks, and the consequences for a persona fitted to it."""
     notes = []
     left_out = len(timeline.minutes) - len(days)
-    if left_out > 2:  # the first and the last
+    if left_out > 2:  # the first and the last always are
         notes.append(
             f"{left_out} of {len(timeline.minutes)} days are left out: the night before or after"
             " them isn't in the log, or they begin before midnight"
@@ -215,7 +215,7 @@ class _Fitter:
             self._add(self.names[state], state, takes=_takes(done))
         recorded = [_recorded_day(self.timeline, day, self.names) for day in days]
         used = {name for day in recorded for name in day.activities} - set(self.activities)
-        for name in sorted(used - {"sleep", "rest"}):  # never for most of a minute
+        for name in sorted(used - {"sleep", "rest"}):  # states that never fill most of a minute
             state = self.names.index(name)
             self._add(name, state, takes=_takes([Stretch(state, 0, 1)]))
         return recorded

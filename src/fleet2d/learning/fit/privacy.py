@@ -1,4 +1,4 @@
-"""Days for a persona that others may see: like those of a log, with none of its times.
+"""Days for a persona to share: like those of a log, with none of its times.
 
 A day is drawn from the recorded ones, and each of its stays gets another length. What remains of
 the log is the order of activities within a part of a day, about when they are, and about how long.
@@ -19,20 +19,20 @@ from fleet2d.routines.planner import (
 )
 from fleet2d.runtime.determinism import Draws, stream_key
 
-# An activity of fewer days than this is left out: it would tell of these days.
+# An activity on fewer days is left out, as it would give these days away.
 MIN_DAYS = 2
-# How far waking, and the length of a stay, is changed at most: [s], and relative to the length.
+# The largest changes of waking and of the length of a stay: [s], and relative to the length.
 WAKE_SHIFT_S = 600
 LENGTH_SHIFT_S = 600
 LENGTH_SHIFT = 0.25
 # Beyond this shift of a day's times, lengths are changed in the direction that reduces it [s].
 MAX_SHIFT_S = 900
-DAYS_PER_DAY = 2  # how many days are made of each recorded one
-TRIES = 20  # of several draws of a day, the one is taken that repeats least
+DAYS_PER_DAY = 2  # days that are made for each recorded day
+TRIES = 20  # draws of a day, of which the least repetitive is taken
 
 
 class Repeats(NamedTuple):
-    """How many successive changes of activity, to the minute, days share with one day of a log.
+    """Lengths of runs of changes of activity, to the minute, that days share with those of a log.
 
     Attributes:
         mean: The mean of the days' longest runs of such changes.
@@ -48,7 +48,7 @@ class Repeats(NamedTuple):
 
 
 def repeats(days: Sequence[RecordedDay], log: Sequence[RecordedDay]) -> Repeats:
-    """Return how much of a log days repeat; a day isn't compared with itself.
+    """Return how much of a log some days repeat; no day is compared with itself.
 
     >>> from fleet2d.routines.planner import parse_day
     >>> one = parse_day("07:00 wash, 07:20:10 work, 12:00 tv, 23:00 sleep, 31:00 end")
@@ -89,7 +89,7 @@ def _changes(day: RecordedDay) -> list[tuple[int, str]]:
 def private_days(days: Sequence[RecordedDay], seed: int, kind: str = "") -> list[RecordedDay]:
     """Return new days that are like recorded ones.
 
-    None repeats more of one recorded day than these repeat of each other, nor a recorded time.
+    No new day repeats more of a recorded day than recorded days repeat of each other, or a time.
 
     Args:
         days: The recorded days of a kind.
@@ -107,7 +107,7 @@ def private_days(days: Sequence[RecordedDay], seed: int, kind: str = "") -> list
             found = repeats([day], days).longest
             if best is None or found < best[0]:
                 best = found, day
-            if found <= limit // 2:  # as days made of two of them repeat more
+            if found <= limit // 2:  # simulated days join two, and repeat more
                 break
         assert best is not None
         if best[0] <= limit:
@@ -150,7 +150,7 @@ def _draw(days: Sequence[RecordedDay], draws: Draws) -> RecordedDay:
 
 
 def _length(episode: Episode, shift: int, draws: Draws) -> int:
-    """Return another length of an episode that begins so much later than recorded [s]."""
+    """Return another length [s] of an episode that begins `shift` seconds later than recorded."""
     length = episode.end - episode.begin
     most = max(1, min(LENGTH_SHIFT_S, int(LENGTH_SHIFT * length)))
     change = _within(draws, most)

@@ -30,14 +30,14 @@ from fleet2d.runtime.determinism import sum_in_order
 UNKNOWN_STATE = -1
 KINDS = frozenset({*SIMILAR_ROOMS, DOOR, AWAY})
 """The kinds of rooms that labels are taken for."""
-# Silence up to this counts as staying in the room, in general and in one room.
+# The longest silences that count as a stay: between rooms, and within one room.
 HOLD = timedelta(hours=3)
 MAX_STILLNESS = timedelta(hours=12)
 MIN_ABSENCE = timedelta(minutes=10)  # a longer silence at the front door counts as being out
 # An activity in a room with less time and fewer runs than this loses its name.
 RARE_MINUTES = 30
 RARE_RUNS = 4
-# Being up for up to this long in the night doesn't end the night [min].
+# The longest waking that doesn't end a night [min].
 MAX_NIGHT_WAKING = 60
 SHORTEST_NIGHT = 120  # min
 NOON = DAY_MINUTES // 2
@@ -54,12 +54,12 @@ class ActivityPlace(NamedTuple):
 
 @dataclass(frozen=True)
 class Timeline:
-    """The state in each second, and in each minute: that of most of its seconds.
+    """The states of a log by second and by minute, where the most frequent state counts.
 
     Attributes:
         states: The states.
         minutes: Index of the state in each minute, -1 if unknown, int16 (days, 1440).
-        seconds: The same of each second, int16 (days, 86400).
+        seconds: Index of the state in each second, -1 if unknown, int16 (days, 86400).
         weekdays: Day of the week of each day, 0 = Monday; None if the log has no dates.
     """
 
@@ -169,7 +169,7 @@ def kinds_of(log: ActivityLog, rooms: Mapping[str, str]) -> dict[str, tuple[str,
 
 
 def _kind(label: str) -> str:
-    """Return the kind of room that a label usually means; the label as one, if there is none."""
+    """Return the kind of room that a label usually means, or else the label itself."""
     if label == AWAY:
         return AWAY
     kind = room_type(label)
@@ -273,7 +273,7 @@ class LivedDay(NamedTuple):
         bed: Its end.
         next_wake: The beginning of the next day.
         awake: The known stretches from `wake` to `bed`.
-        up: The stretches out of bed in the night after it; of a night away, all of it.
+        up: The stretches out of bed in the following night; all of a night away.
     """
 
     number: int
@@ -342,7 +342,7 @@ def _nights_away(
 ) -> dict[int, tuple[int, int]]:
     """Return begin and end [min] of the nights in which the person is never at home.
 
-    They are as long as the median night at home, so that days end when they usually do.
+    These nights get the median length of nights at home, so that days end as usual.
     """
     if not nights:
         return {}
@@ -371,11 +371,11 @@ def _runs(flat: I16, begin: int, end: int, midnight: int) -> tuple[Stretch, ...]
 
 
 class RoutineDistances(NamedTuple):
-    """RoutineDistances between sets of days, 0 where they are alike.
+    """Distances between sets of days, 0 where they are alike.
 
     Attributes:
         share: Total variation between the shares of time, 0 to 1.
-        hours: The same hour by hour, on average over the hours of a day.
+        hours: Total variation hour by hour, averaged over the hours of a day.
         ks: Largest gap between the distribution functions of the durations of stays, 0 to 1.
         stay_min: Wasserstein distance between those durations [min].
         transitions: Total variation between the shares of the changes from one label to another.

@@ -36,7 +36,7 @@ EQUAL = 0.0005
 FOLDS = 3
 SAMPLED = 700  # the number of days drawn from a persona, whole weeks
 CHAIN_DAYS = 140  # the number of days drawn from the chain
-# the same where seconds are compared
+# Both numbers where seconds are compared.
 SAMPLED_BY_SECOND = 140
 CHAIN_DAYS_BY_SECOND = 7
 
@@ -57,7 +57,7 @@ def sample_persona(
         place_of[activity] = places.index(timeline.states[state].place)
     states = np.zeros((days + 2) * DAY_S, np.int16)
     rooms = np.zeros((days + 2) * DAY_S, np.int16)
-    for day in range(days + 1):  # the first night is of the day before the first
+    for day in range(days + 1):  # the first one is for the night before the first day
         ordinal = MONDAY - 1 + day
         for episode in life.day(ordinal):
             begin = day * DAY_S + episode.begin
@@ -115,7 +115,7 @@ def simulated_repeats(fitted: FittedPersona, days: int = 140, seed: int = 0) -> 
 
 
 class Validation(NamedTuple):
-    """RoutineDistances to held-back days, averaged over the folds.
+    """Distances to held-back days, averaged over the folds.
 
     Attributes:
         days: The number of days, each held back once.
@@ -134,7 +134,7 @@ class Validation(NamedTuple):
     def worse_than_copying(self) -> list[str]:
         """Return a line for each measure in which the persona is worse than days copied from a log.
 
-        The measures compare in which rooms somebody is with the days held back.
+        The measures compare the rooms by minutes with those of the days held back.
         """
         keys = {
             "dwell times (KS)": "ks", "hours": "hours", "time shares": "share",
@@ -194,7 +194,7 @@ def _fold(
 ) -> list[tuple[RoutineDistances, ...]]:
     """Return how far the days of each model are from days held back.
 
-    They are compared in rooms and in activities by minutes, and in rooms by seconds.
+    Rooms and activities are compared by minutes, and rooms also by seconds.
     """
     states, rooms = sample_persona(fitted, timeline, SAMPLED, seed)
     rooms_by_second = sample_persona(fitted, timeline, SAMPLED_BY_SECOND, seed, to_second=True)[1]

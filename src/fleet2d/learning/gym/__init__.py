@@ -1,6 +1,6 @@
 """Environments of Gymnasium and PettingZoo in which agents learn to be home robots.
 
-Needs the extra `gym`. To import this package registers the environments `fleet2d/Hangout-v1`,
+Needs the extra `gym`. Importing this package registers the environments `fleet2d/Hangout-v1`,
 `fleet2d/Find-v1`, `fleet2d/Patrol-v1` and `fleet2d/Interact-v1`;
 "fleet2d.learning.gym:fleet2d/Hangout-v1" does so by itself.
 """

@@ -38,7 +38,7 @@ class RobotLife:
     Attributes:
         simulation: The run.
         robots: The names of the robots.
-        due: Those that have to choose now.
+        due: The robots that have to choose now.
     """
 
     def __init__(self, simulation: Simulation, robots: tuple[str, ...]) -> None:
@@ -50,10 +50,10 @@ class RobotLife:
         self.robots = robots
         actors = simulation.actors
         self._actors = {robot: actors[robot] for robot in robots}
-        self._now: dict[str, Situation] = {}  # at the newest step at which each was asked for
+        self._now: dict[str, Situation] = {}  # the newest situation of each robot
 
     def __getstate__(self) -> tuple[Simulation, tuple[str, ...], list[str]]:
-        """Leave out what belongs to the simulation, which keeps its state in its own way."""
+        """Return the simulation, the robots and those due; all else follows from them."""
         return self.simulation, self.robots, self.due
 
     def __setstate__(self, state: tuple[Simulation, tuple[str, ...], list[str]]) -> None:
@@ -82,7 +82,7 @@ class RobotLife:
         self.due = run_until_asked(self.simulation, *self.robots)
 
     def now(self, robot: str) -> Situation:
-        """Return what a robot knows of the present step."""
+        """Return the situation of a robot at the present step."""
         now = self._now.get(robot)
         if now is None or now.step != self.simulation.step:
             now = self._now[robot] = situation_of(self.simulation, robot)
@@ -99,7 +99,7 @@ class RobotLife:
 
     def terms(self, robot: str) -> dict[str, float]:
         """Return the terms of rewards, from the beginning to the present step."""
-        nothing = dict.fromkeys(TERMS, 0.0)  # at the first step
+        nothing = dict.fromkeys(TERMS, 0.0)  # metrics have no results at the first step
         terms: dict[str, float] = measured(self.simulation, METRIC).get(robot, nothing)
         return terms
 
@@ -125,9 +125,9 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         robot: The robot; left out: the only one with a policy.
         reward: Weights of terms in place of the task's, or a function that is called with the
             environment after each step.
-        split: Which values of what varies are drawn.
-        masked: What an impossible action is: the same as the last one, or an error.
-        truth: Put the truth, where everybody is, into `info`.
+        split: The split whose values are drawn.
+        masked: How an impossible action counts: as the last action, or as an error.
+        truth: Whether `info` has the true places of everybody.
 
     Example:
         >>> env = RobotEnv("hangout", "simulation.duration=1 d")
@@ -165,7 +165,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         self.render_mode = render_mode
         variant = self.variants.first(self.split)
         self.robot = robot or variant.robots[0]
-        self.robots: tuple[str, ...] = (self.robot,)  # those that have to choose in its lives
+        self.robots: tuple[str, ...] = (self.robot,)  # the robots that choose in its lives
         if self.robot not in variant.robots or (robot is None and len(variant.robots) > 1):
             raise InputError(
                 f"name the robot that learns by robot=…: one of {', '.join(variant.robots)}"
@@ -183,8 +183,8 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         """Begin a new life.
 
         Args:
-            seed: Seed of all that is drawn from now on.
-            options: `values`: values of what varies, by key; `seed`: the seed of the life.
+            seed: Seed of all further draws.
+            options: `values`: values of the keys that vary; `seed`: the seed of the life.
 
         Raises:
             InputError: The scenario with these values is wrong.
@@ -235,7 +235,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         return observation, reward, is_empty, not life.due and not is_empty, info
 
     def allowed(self, action: Any) -> int:
-        """Return an action, or that to rest in place of one that is masked, if so configured.
+        """Return an action; a masked one becomes that to rest, if so configured.
 
         Raises:
             InputError: The action isn't a whole number.
@@ -250,7 +250,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         return action
 
     def collect(self) -> float:
-        """Return the reward since it was collected last."""
+        """Return the reward since the last call."""
         if callable(self.reward):
             return float(self.reward(self))
         before = self._terms
@@ -269,7 +269,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         return self.present.simulation.finish()
 
     def action_masks(self) -> Bool:
-        """Return which actions are possible, bool (rows + 1,), as MaskablePPO asks for it."""
+        """Return which actions are possible, bool (rows + 1,); MaskablePPO calls this method."""
         return self.present.mask(self.robot)
 
     def render(self) -> Any:
@@ -283,7 +283,7 @@ class RobotEnv(gymnasium.Env[F32, np.int64]):  # type: ignore[misc]
         """The present life.
 
         Raises:
-            InputError: There is none yet.
+            InputError: No life has begun yet.
         """
         if self.life is None:
             raise InputError("there is no life yet: call reset()")
@@ -308,7 +308,7 @@ class DiscountByTime(gymnasium.Wrapper[Any, Any, Any, Any]):  # type: ignore[mis
     """Discounts rewards by the time since the beginning of the life.
 
     A reward counts 2 ** -(t / half_life), with t the time at which its interval began; learn with
-    a discount factor of 1. `info["discount"]` is that of the next interval.
+    a discount factor of 1. `info["discount"]` is the discount of the next interval.
 
     Args:
         env: The environment.
@@ -322,7 +322,7 @@ class DiscountByTime(gymnasium.Wrapper[Any, Any, Any, Any]):  # type: ignore[mis
 
     @property
     def discount(self) -> float:
-        """How much the next reward counts."""
+        """The discount of the next reward."""
         return float(2 ** -(self._elapsed_s / self._half_life_s))
 
     def reset(self, **settings: Any) -> tuple[Any, dict[str, Any]]:
@@ -343,17 +343,17 @@ class DiscountByTime(gymnasium.Wrapper[Any, Any, Any, Any]):  # type: ignore[mis
 class VectorRobotEnv(SyncVectorEnv):  # type: ignore[misc]
     """Some environments that are stepped together; they share their homes.
 
-    Where a life is over, the next step begins a new one, and ignores the action. `info` has the
+    If a life is over, the next step begins a new one and ignores the action. `info` has the
     arrays `action_mask`, int8 (n, actions), and `elapsed_s`, float64 (n,).
 
     Args:
         num_envs: Number of environments.
-        settings: Those of `RobotEnv`.
+        settings: The settings of `RobotEnv`.
     """
 
     def __init__(self, num_envs: int = 1, *overrides: str, **settings: Any) -> None:
         variants = RobotEnv(settings.pop("task", "hangout"), *overrides, **settings).variants
-        # Gymnasium keeps what makes an environment: a function that can be pickled.
+        # Gymnasium keeps functions that make environments, which must be picklable.
         super().__init__([partial(_env_with, variants, settings)] * num_envs)
 
     def action_masks(self) -> Bool:

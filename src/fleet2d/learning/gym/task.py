@@ -27,12 +27,12 @@ from fleet2d.studies.axes import check_count
 
 FOLDER = Path(__file__).with_name("tasks")
 Split = Literal["train", "validation", "test"]
-# Scenarios of one task that are kept, and their homes.
+# The numbers of scenarios and of homes that are kept for a task.
 KEPT = 512
 HOMES = 128
 
 METRIC = "household"
-"""The metric of every life, which counts what rewards are made of: see `HouseholdReward`."""
+"""The metric of every life, which measures the terms of rewards: see `HouseholdReward`."""
 
 
 class Values(Settings):
@@ -63,7 +63,7 @@ class Values(Settings):
 
 
 class LearningTask(Settings):
-    """What an agent learns.
+    """The scenarios and the rewards from which an agent learns.
 
     Attributes:
         scenario: The scenario, or the file of one.
@@ -101,7 +101,7 @@ class LifeScenario(NamedTuple):
 
 
 class Variants:
-    """The scenarios of a task, with the newest ones kept."""
+    """The scenarios of a task; the newest ones are kept."""
 
     def __init__(self, task: LearningTask, overrides: tuple[str, ...] = ()) -> None:
         self.task = task
@@ -146,7 +146,7 @@ def load_task(source: str | Path | Mapping[str, Any] | LearningTask) -> Learning
     """Return a task: one of ours by name, a file of a task or a scenario, or its content.
 
     Raises:
-        InputError: There is none, or it is wrong.
+        InputError: There is no such task, or it is wrong.
 
     Example:
         >>> load_task("hangout").reward["near_min"]
@@ -173,7 +173,7 @@ def checked(document: Document) -> LearningTask:
     """Return the task of a document.
 
     Raises:
-        ScenarioError: It is wrong.
+        ScenarioError: The task is wrong.
     """
     try:
         return LearningTask.model_validate(document.data)

@@ -1,1 +1,1 @@
-"""What simulated people are worth to models that are used in real homes: `fleet2d transfer`."""
+"""The worth of simulated people for models in real homes: `fleet2d transfer`."""

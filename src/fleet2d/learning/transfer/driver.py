@@ -1,4 +1,4 @@
-"""Running a transfer experiment: its cells are the variants of a study, with which they resume."""
+"""Running a transfer experiment: its cells are run, stored and resumed as variants of a study."""
 
 import hashlib
 import json
@@ -65,7 +65,7 @@ class CellJob:
     """Trains and scores cells in a worker.
 
     Attributes:
-        sources: What they learn from.
+        sources: The people that their models learn from.
     """
 
     sources: Sources

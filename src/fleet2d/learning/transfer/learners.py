@@ -10,11 +10,11 @@ from fleet2d.kernels import F64, I16, I64
 from fleet2d.learning.transfer.traces import CLASSES, KINDS, MinuteTrace
 from fleet2d.runtime.clock import DAY_MINUTES
 
-STRIDE = 5  # minutes between moments that are learned from and tested
-HISTORY = 180  # minutes before the first moment
+STRIDE = 5  # minutes between moments
+HISTORY = 180  # minutes of a trace before its first moment
 LONGEST = 2 * DAY_MINUTES  # the time since a room was visited is cut here [min]
-SHORT = 15  # minutes of the shorter of the two times whose shares of rooms are features
-# The part of the probability that all outcomes share, also those never seen.
+SHORT = 15  # minutes of the shorter time whose shares of rooms are features
+# The part of the probability that is shared among all outcomes, also unseen ones.
 FLOOR = 0.02
 # The weight of a home's own moments among others.
 OWN_WEIGHT = 10.0
@@ -26,13 +26,13 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 class ForecastMoments(NamedTuple):
-    """Moments of a trace: features, what is to be predicted, and the day.
+    """Moments of a trace: features, outcome, and day.
 
     Attributes:
         inputs: float32 (n, features); the first two are the place now, and the one before.
-        outcome: int64 (n,).
+        outcome: The room or activity to predict, int64 (n,).
         day: The number of the day of each, int64 (n,).
-        weight: float64 (n,).
+        weight: The weight in training, float64 (n,).
     """
 
     inputs: Any
@@ -50,7 +50,7 @@ class ForecastMoments(NamedTuple):
 
 
 def moments(trace: MinuteTrace, task: str) -> ForecastMoments:
-    """Return the moments of a trace at which something is to be predicted.
+    """Return the moments of a trace at which a task predicts.
 
     Args:
         trace: The trace.
@@ -92,7 +92,7 @@ def _features(codes: I16, weekday: int, at: I64) -> Any:
 
 
 def pooled(parts: Sequence[ForecastMoments], rows: int, seed: int) -> ForecastMoments:
-    """Return moments of several traces together, at most so many of them, drawn at random."""
+    """Return moments of several traces together, at most `rows` of them, drawn at random."""
     whole = ForecastMoments(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     if len(whole.outcome) <= rows:
         return whole
@@ -137,7 +137,7 @@ def fit_and_predict(
 
 
 class Forecast(NamedTuple):
-    """What was predicted at moments: log losses, hits, and the day of each.
+    """The scores of predictions at moments, with the day of each.
 
     Attributes:
         loss: float64 (n,) [nats].

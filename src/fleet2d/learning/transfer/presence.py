@@ -15,7 +15,7 @@ from fleet2d.metrics.rtp_score import log_loss, top_k
 from fleet2d.runtime.clock import DAY_S
 
 SETTINGS = TrainingSettings(hidden=16, epochs=6, trust=(1.0,) * TRUSTS)
-# How often a home's own windows count among others.
+# The number of times that a home's own windows count among others.
 OWN_REPEATS = 3
 
 
@@ -25,7 +25,7 @@ def of_days(parts: Sequence[Windows], days: I64) -> list[Windows]:
 
 
 def thinned(parts: Sequence[Windows], rows: int) -> list[Windows]:
-    """Return every n-th window, so that they are about so many."""
+    """Return every n-th window, so that about `rows` remain."""
     every = max(1, -(-sum(len(part.truth) for part in parts) // rows))
     return [part.rows(slice(None, None, every)) for part in parts]
 

@@ -1,4 +1,4 @@
-"""What a transfer experiment says: a table and a figure for each task, and a few sentences."""
+"""The report of a transfer experiment: a table and a figure for each task, and sentences."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -56,8 +56,8 @@ def compared(study: Study, task: str, against: str) -> "pl.DataFrame":
 def over_days(homes: Sequence[Sequence[float]]) -> tuple[float, float, float]:
     """Return the mean over homes of their mean differences, and its 95 % interval over days.
 
-    The homes are given, their days are a sample: the variances of the means of the homes add up,
-    with the degrees of freedom of Satterthwaite.
+    Homes are fixed and their days a sample: the variances of the homes' means add up, with the
+    degrees of freedom of Satterthwaite.
 
     Example:
         >>> [round(value, 2) for value in over_days([[0.1, 0.2, 0.3], [0.3, 0.5, 0.4]])]
@@ -65,7 +65,7 @@ def over_days(homes: Sequence[Sequence[float]]) -> tuple[float, float, float]:
     """
     means = [sum_in_order(values) / len(values) for values in homes]
     mean = sum_in_order(means) / len(means)
-    if min(map(len, homes)) < 2:  # one day tells nothing of others
+    if min(map(len, homes)) < 2:  # a single day has no variance
         return mean, math.nan, math.nan
     variances = [float(np.var(v, ddof=1)) / len(v) / len(homes) ** 2 for v in homes]
     variance = sum_in_order(variances)
@@ -86,15 +86,15 @@ def write_report(study: Study, folder: Path) -> list[str]:
         picture = folder / f"{task.replace(' ', '_')}.png"
         write_picture(picture, lambda task=task: draw(study, task))  # type: ignore[misc]
         lines += [f"## {task}", "", table(study, task), f"![{metric}]({picture.name})", ""]
-    for task in _told(tasks):
+    for task in _summarized(tasks):
         sentences += sentences_of(study, task)
     lines += [*sentences, "", *study.meta.notes.splitlines()]
     write_atomically(folder / PAGE, "\n".join(lines).encode())
     return sentences
 
 
-def _told(tasks: Sequence[str]) -> list[str]:
-    """Return the tasks that the sentences are about: rooms in an hour, and what else there is."""
+def _summarized(tasks: Sequence[str]) -> list[str]:
+    """Return the tasks of the sentences: the room in an hour, and one other than rooms."""
     rooms = [task for task in tasks if task.startswith("room")]
     hour = [task for task in rooms if "60" in task] or rooms[:1]
     return [*hour, *(task for task in tasks if task not in rooms)][:2]
@@ -146,7 +146,7 @@ def _better(row: dict[str, Any], task: str) -> int:
 
 
 def sentences_of(study: Study, task: str) -> list[str]:
-    """Return what the comparisons of a task say, two sentences at most."""
+    """Return the results of a task's comparisons in at most two sentences."""
     learner = study.complete["learner"][0]
     found = []
     for against, arm in ((REFERENCE, "both"), ("own", "fitted")):

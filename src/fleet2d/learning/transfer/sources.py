@@ -1,4 +1,4 @@
-"""What models learn from: real days, and those of simulated people, whose data sets are stored."""
+"""The days that models learn from: real ones, and simulated ones, stored as data sets."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -35,7 +35,7 @@ PRESENCE = "presence"
 
 
 class Sources:
-    """The people that models learn from, by name; what is simulated of them is made once.
+    """The people that models learn from, by name; each is simulated once.
 
     Attributes:
         file: The settings.
@@ -44,7 +44,7 @@ class Sources:
     """
 
     def __init__(self, plan: TransferPlan, folder: Path) -> None:
-        """Make nothing yet."""
+        """Prepare the sources; none is simulated yet."""
         self.file: TransferFile = plan.file
         self.homes: Mapping[str, HomeEntry] = plan.homes
         self.tested: Mapping[str, I64] = plan.tested
@@ -52,7 +52,7 @@ class Sources:
         self._moments: dict[tuple[str, str], ForecastMoments] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what a worker computes anew."""
+        """Leave out caches, which a worker computes anew."""
         kept = {k: v for k, v in self.__dict__.items() if k != "plans"}
         return {**kept, "_moments": {}}
 
@@ -63,7 +63,7 @@ class Sources:
 
     @property
     def copied_days(self) -> int:
-        """How many days of a home are copied: as many as a simulated person lives."""
+        """The number of copied days of a home, equal to that of a simulated person."""
         return self.file.lived_days * self.plans
 
     def names(self, cells: list[Cell]) -> list[str]:
@@ -86,10 +86,10 @@ class Sources:
                 yield f"{cell.arm}-{cell.home}-{cell.days}"
 
     def make(self, names: list[str], crew: Crew) -> dict[str, str]:
-        """Simulate the data sets that are lacking; all are checked before the first run.
+        """Simulate the missing data sets; all are checked before the first run.
 
         Returns:
-            Why a data set can't be made at all, by its name, where `skip` allows that.
+            Why data sets can't be made at all, by name, if `skip` allows it.
 
         Raises:
             ScenarioError: People don't fit into homes, and `skip` is left out.
@@ -171,8 +171,6 @@ class Sources:
         make = markov if kind == "markov" else copied
         return make(home.trace, home.own(days), count, self.file.seed)
 
-    # Moments, for rooms and activities
-
     def moments_of(self, name: str, task: str) -> ForecastMoments:
         """Return the moments of a source: a data set, or `real-HOME`."""
         key = name, task
@@ -215,8 +213,6 @@ class Sources:
         """Return the moments of some days of the home of a cell."""
         own = self.moments_of(f"real-{cell.home}", cell.task)
         return own.where(np.isin(own.day, days))
-
-    # Windows, for presence
 
     def windows_of(self, name: str) -> list[Windows]:
         """Return the windows of a data set."""

@@ -40,10 +40,10 @@ ARMS: dict[str, str] = {
     "copied": "copies of the home's own days",
     "survey": "people of the time use survey",
 }
-"""What each arm is trained on."""
+"""The training data of each arm."""
 WITHOUT_OWN = ("real", "simulated", "both", "survey")
 WITH_OWN = ("real", "own", "tuned", "both", "fitted", "markov", "copied")
-# The number of days to which a persona is fitted at least.
+# The least number of days to which a persona is fitted.
 FIT_DAYS = 3
 Learner = Literal["usual", "regularised"]
 
@@ -73,7 +73,7 @@ class RealHome(Settings):
         """Read the log.
 
         Raises:
-            LogError: It can't be read, or is one of positions.
+            LogError: The log can't be read, or is of positions.
         """
         log = read_log(self.path, self.format, id=self.id, time_zone=self.time_zone, sort=self.sort)
         if not isinstance(log, ActivityLog):
@@ -134,7 +134,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class HomeEntry:
-    """What is known of a real home.
+    """A real home with its log.
 
     Attributes:
         settings: Its settings.
@@ -156,7 +156,7 @@ class HomeEntry:
         """Return the persona fitted to its first days.
 
         Raises:
-            LogError: No night before and after a day is known.
+            LogError: No day has a known night before and after it.
         """
         first = int(self.trace.days[0])
         end = int(self.own(days)[-1]) + 1
@@ -177,7 +177,7 @@ class TransferPlan:
         homes: The homes that can be read.
         cells: The cells that can be trained and scored.
         tested: The days of each home that are tested on, the same for all of its cells.
-        unfit: What can't be, and why: a line each, with the number of cells.
+        unfit: Why cells can't be trained or scored: a line each, with their number.
     """
 
     name: str
@@ -190,11 +190,11 @@ class TransferPlan:
 
 
 def read_plan(path: Path) -> TransferPlan:
-    """Read a file and all of its logs, and find out what can be trained and scored.
+    """Read a file and all of its logs, and find the cells that can be trained and scored.
 
     Raises:
-        ScenarioError: The file is wrong; or something can't be, and `skip` is left out: all of it
-            is told at once, naming each home.
+        ScenarioError: The file is wrong, or cells can't be trained and `skip` is left out: one
+            message names all homes.
     """
     document: Document = read_document(path)
     try:
@@ -210,7 +210,7 @@ def read_plan(path: Path) -> TransferPlan:
             plan.unfit[f"{name}: {error}"] = count
     for name, home in plan.homes.items():
         _add_cells(plan, name, home)
-    plan.cells.sort(key=lambda cell: file.tasks.index(cell.task))  # one task after the other
+    plan.cells.sort(key=lambda cell: file.tasks.index(cell.task))  # task by task
     if plan.unfit and file.skip is None:
         lines = [f"{words} ({count} cells)" for words, count in plan.unfit.items()]
         head = "some models can't be trained or scored; `skip: unfit` leaves them out and counts"
@@ -224,7 +224,7 @@ def _read_home(settings: RealHome) -> HomeEntry:
     """Read the log of a home.
 
     Raises:
-        LogError: It can't be read, or says neither where anybody is, nor when.
+        LogError: The log can't be read, or has neither places nor times.
     """
     log = settings.read()
     trace = trace_of_log(log, settings.rooms, settings.activities)
@@ -248,7 +248,7 @@ def _cells(file: TransferFile, home: str) -> Iterator[Cell]:
 
 
 def _add_cells(plan: TransferPlan, name: str, home: HomeEntry) -> None:
-    """Add the cells of a home, or say why not."""
+    """Add the cells of a home, or note why it has none."""
     file = plan.file
     known = len(home.trace.days)
     possible = [days for days in file.days if days + file.test_days <= known]

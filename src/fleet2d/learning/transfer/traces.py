@@ -29,7 +29,7 @@ OTHER = KINDS.index("other")
 OUT = KINDS.index(AWAY)
 UNKNOWN = -1
 CLASSES = ("out", "sleep", "toilet", "wash", "food", "leisure", "other")
-# A name is of the first class with a word that begins one of its words.
+# A name belongs to the first class with a word that begins one of the name's words.
 WORDS = {
     "food": "dish cook prep breakfast lunch dinner supper snack meal eat drink food",
     "sleep": "sleep nap",
@@ -50,7 +50,7 @@ class MinuteTrace:
 
     Attributes:
         rooms: Index of the kind of room; passages count as the room before them.
-        sensors: Index of the kind of room whose sensor fired last; no sensor shows who is away.
+        sensors: Index of the kind of room whose sensor fired last; no sensor shows absence.
         activities: Index of the class of activity.
         weekday: Day of the week of the first day, 0 = Monday.
         days: The days that are known for most of the time, int64.
@@ -130,7 +130,7 @@ def _class_of_state(state: ActivityPlace, activities: dict[str, str]) -> int:
 
 
 def _held(codes: I16, ignored: int) -> I16:
-    """Return codes in which one, such as that of passages, is replaced by the code before it."""
+    """Return codes in which one code, such as that of passages, gives way to the one before it."""
     at = np.where(codes == ignored, 0, np.arange(len(codes)))
     held = codes[np.maximum.accumulate(at)]
     return np.where(held == ignored, UNKNOWN, held).astype(np.int16)
@@ -171,14 +171,14 @@ def copied(trace: MinuteTrace, days: Any, count: int, seed: int) -> MinuteTrace:
 
 
 def markov(trace: MinuteTrace, days: Any, count: int, seed: int) -> MinuteTrace:
-    """Return days of the first-order Markov chain of some days: of all that a minute has."""
+    """Return days of the first-order Markov chain of whole minutes of some days."""
     own = trace.joined(days)
     stacked = np.stack([own.rooms, own.sensors, own.activities])
     states, numbers = np.unique(stacked, axis=1, return_inverse=True)
     numbers = numbers.ravel()
     follows = np.zeros((states.shape[1], states.shape[1]))
     np.add.at(follows, (numbers[:-1], numbers[1:]), 1)
-    follows[numbers[-1], numbers[0]] += 1  # so that each state has a next one
+    follows[numbers[-1], numbers[0]] += 1  # every state needs a successor
     limits = (follows / follows.sum(axis=1, keepdims=True)).cumsum(axis=1)
     at = int(numbers[0])
     path = np.empty(count * DAY_MINUTES, np.int64)
@@ -191,7 +191,7 @@ def markov(trace: MinuteTrace, days: Any, count: int, seed: int) -> MinuteTrace:
 
 
 def write_log(trace: MinuteTrace, first_day: date, path: Path) -> None:
-    """Write the rooms of a trace, but those of no known kind, as a log that can be replayed."""
+    """Write the rooms of known kinds of a trace as a log that can be replayed."""
     moment = datetime.combine(first_day, datetime.min.time())
     lines = []
     for minute, code in enumerate(trace.rooms.tolist()):
