@@ -64,6 +64,19 @@ def test_home_assistants_unavailable_is_a_gap_that_a_note_tells(tmp_path):
     assert note in run.manifest["notes"]
 
 
+def test_a_door_that_shuts_in_the_repeated_hour_of_a_day_of_24_hours_is_shut_after_it(tmp_path):
+    """The reading was left out without a word: the door stood open until the morning."""
+    text = "time,state\n2026-10-25T00:50:00Z,OPEN\n2026-10-25T01:10:00Z,CLOSE\n"
+    content = scenario(write(tmp_path, text), day="date", time_zone="Europe/Berlin")
+    content["simulation"] |= {"start": "2026-10-25T02:00", "duration": "2 h"}
+
+    run = fleet2d.run(content)
+
+    rows = [f"{r['time']:%H:%M} {r['state']}" for r in run.tables["sensors"].to_pylist()]
+    assert rows == ["02:50 ON", "03:00 OFF"]
+    assert any("summer time repeats count at its end" in note for note in run.manifest["notes"])
+
+
 def test_what_is_outside_of_the_run_is_told(tmp_path):
     content = scenario(write(tmp_path, ROWS), sensor="door")
     content["simulation"]["duration"] = "11 min"

@@ -89,11 +89,13 @@ def test_run_shows_itself_in_marimo(run_dir):
     assert "<marimo-anywidget" in marimo.as_html(fleet2d.view(run)).text
 
 
-def test_missing_library_is_named(run_dir, monkeypatch):
+@pytest.mark.parametrize("is_home", [False, True])
+def test_missing_library_is_named(run_dir, monkeypatch, is_home):
     run = fleet2d.open_run(run_dir)
-    for name in [name for name in sys.modules if name.startswith("fleet2d.viewing.pictures")]:
+    drawing = ("fleet2d.viewing.pictures", "fleet2d.viewing.figures", "matplotlib")
+    for name in [name for name in sys.modules if name.startswith(drawing)]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
 
     with pytest.raises(InputError, match=r"need.* matplotlib: pip install"):
-        fleet2d.draw(run)
+        fleet2d.draw(run.plan if is_home else run)

@@ -270,10 +270,12 @@ class ReplaySensor(Sensor, LogKeys):
             self.path, "readings", whole.first_day, whole.time_us, nothing, nothing[:, 0]
         )
         said: list[str] = []
-        local = stamps.local(self.path, "readings", chosen, said, time_zone=zone, sort=self.sort)
+        local = stamps.local(
+            self.path, "readings", chosen, said, time_zone=zone, sort=self.sort, are_states=True
+        )
         _, begin_us, notes = in_run(log, self.day, clock)
         time_us = by_clock_of_run(replace(log, time_us=local.time_us), self.day, clock).time_us
-        notes = (*notes, *(said if clock.zone else ()))
+        notes = (*notes, *said)
         states = table.column("state").to_pylist()
         on = [_is_on(states[row], self.path, table.line[row]) for row in local.row.tolist()]
         self._steps = (time_us - begin_us) // clock.step_us

@@ -1,6 +1,7 @@
 """Times of logs: text, timestamps and numbers since 1970 as local times, in order."""
 
 from datetime import UTC, date, datetime, timedelta
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 from zoneinfo import ZoneInfo, available_timezones
@@ -67,6 +68,7 @@ class Stamps(NamedTuple):
         *,
         time_zone: Zone | str | None,
         sort: bool,
+        are_states: bool = False,
     ) -> "LocalTimes":
         """Return the usable rows of the file in order of their local times.
 
@@ -77,6 +79,8 @@ class Stamps(NamedTuple):
             notes: Gets a line for each kind of anomaly.
             time_zone: The time zone of the home; by its name, days have 24 hours.
             sort: Put rows in order of time instead of refusing times that run backwards.
+            are_states: Whether each row holds until the next. Where a day has 24 hours, those of
+                an hour that is repeated then come at its end, instead of being left out.
 
         Raises:
             LogError: There is no row, times run backwards or are out of range, or a time zone is
@@ -95,13 +99,16 @@ class Stamps(NamedTuple):
                     f"{path}: its times are of a time zone; say which local time the home has by"
                     " time_zone, like 'Europe/Berlin' or 'UTC', or by simulation.time_zone"
                 )
-            time_us, repeated = _in_zone(time_us, str(time_zone))
+            time_us, repeated = _in_zone(time_us, str(time_zone), at_end=are_states)
         twice = np.count_nonzero(repeated & usable)
         if twice:
+            fate = "count at its end" if are_states else "were left out"
             notes.append(
                 f"{twice} {noun} of the hour that the end of summer time"
-                " repeats were left out: a simulated day has 24 hours"
+                f" repeats {fate}: a simulated day has 24 hours"
             )
+        if are_states:
+            repeated[:] = False
         row = np.flatnonzero(usable & ~repeated)
         if not len(row):
             raise LogError(f"{path} has no row with a position")
@@ -318,20 +325,29 @@ def parse_numbers(
     return Stamps(time_us, line, has_date, has_date)
 
 
-def _in_zone(utc_us: I64, name: str) -> tuple[I64, Bool]:
-    """Return the local times of a zone [us], and which of them are in a repeated hour."""
+def _in_zone(utc_us: I64, name: str, *, at_end: bool) -> tuple[I64, Bool]:
+    """Return the local times of a zone [us], and which of them are in a repeated hour.
+
+    With `at_end` times of a repeated hour are its end.
+    """
     try:
         zone = ZoneInfo(name)
     except (KeyError, ValueError, OSError):
         hint = did_you_mean(name, available_timezones())
         raise LogError(f"there is no time zone {name!r}{hint}") from None
+
+    def moment(quarter: int) -> datetime:
+        us = timedelta(microseconds=quarter * QUARTER_HOUR_US)
+        return (datetime(1970, 1, 1, tzinfo=UTC) + us).astimezone(zone)
+
     # Clocks change at whole quarters of an hour.
     quarters, inverse = np.unique(utc_us // QUARTER_HOUR_US, return_inverse=True)
-    epoch = datetime(1970, 1, 1, tzinfo=UTC)
-    moments = [
-        (epoch + timedelta(microseconds=int(q) * QUARTER_HOUR_US)).astimezone(zone)
-        for q in quarters
-    ]
+    moments = [moment(quarter) for quarter in quarters.tolist()]
     offsets = [micros(m.utcoffset() or timedelta(0)) for m in moments]
-    folds = np.array([m.fold for m in moments], bool)
-    return utc_us + np.array(offsets, np.int64)[inverse], folds[inverse]
+    is_repeated = np.array([m.fold for m in moments], bool)[inverse]
+    if at_end:
+        ends = [
+            next(q for q in count(quarter) if not moment(q).fold) for quarter in quarters.tolist()
+        ]
+        utc_us = np.where(is_repeated, np.array(ends)[inverse] * QUARTER_HOUR_US, utc_us)
+    return utc_us + np.array(offsets, np.int64)[inverse], is_repeated

@@ -6,12 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import PowerNorm
-from matplotlib.figure import Figure
 
-from fleet2d.errors import InputError
+from fleet2d.errors import InputError, extra
 from fleet2d.expectations.verdict import SignalCourse, VerdictEvidence
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.kernels import F64
@@ -32,6 +28,12 @@ from fleet2d.viewing.pictures.life import blurred, samples_by_cell
 from fleet2d.viewing.pictures.run import run_figure
 from fleet2d.viewing.run_facts import bodies_of
 from fleet2d.viewing.stage import Stage, draw_strip
+
+with extra("viz", "drawing needs matplotlib"):
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import PowerNorm
+    from matplotlib.figure import Figure
 
 FigureKind = Literal["life", "heat", "strip"]
 

@@ -6,7 +6,7 @@ import io
 from contextlib import suppress
 from typing import Any
 
-from fleet2d.errors import Fleet2DError
+from fleet2d.errors import Fleet2DError, extra
 from fleet2d.floorplan.home import Home
 from fleet2d.floorplan.plan import FloorPlan
 from fleet2d.runs.moments import step_of
@@ -51,8 +51,8 @@ def _draw_run(run: Run, at: str | int | None, axes: Any) -> Any:
 
 
 def _draw_plan(plan: FloorPlan, axes: Any) -> Any:
-    from matplotlib.figure import Figure
-
+    with extra("viz", "drawing needs matplotlib"):
+        from matplotlib.figure import Figure
     from fleet2d.viewing.pictures.floorplan import drawing_style, figure_size, floorplan_axes
 
     if axes is not None:
