@@ -2,12 +2,15 @@
 
 import html
 import re
+from datetime import datetime, timedelta
+from types import SimpleNamespace
 
 import polars as pl
 import pytest
 from tests.scenes import OWN
 from tests.studies.scenes import SPEED, base, run, small
 
+from fleet2d.studies.figures import over_time
 from fleet2d.studies.report import short_names, write_report
 
 SIGHTINGS = "sightings.ana"
@@ -118,3 +121,15 @@ def test_only_differences_that_are_clear_after_correction_are_bold(study, page):
 def test_short_names_are_unique():
     names = short_names(["658e5214673c7a4e25b458e5", "658e5214673d7a4e25b458e6", "short"])
     assert ["…b458e5", "…b458e6", "…short"] == list(names.values())
+
+
+def test_a_metric_over_time_is_by_the_time_since_the_start():
+    """Of each two days from six in the morning, its first value stood at a quarter of a day."""
+    steps = [2 * 1440 - 1, 4 * 1440 - 1]
+    times = [datetime(2026, 1, 5, 6) + timedelta(minutes=step) for step in steps]
+    rows = pl.DataFrame({"variant": 0, "step": steps, "time": times, "user": "ana", "tv": [0.5, 1]})
+    study = SimpleNamespace(tables=["error"], columns=(), polars=lambda name: rows.lazy())
+
+    found = over_time(study, "error.ana.tv")
+    assert [2, 4] == found["day"].round(2).to_list()
+    assert [0.5, 1] == found["value"].to_list()

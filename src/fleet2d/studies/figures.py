@@ -25,6 +25,8 @@ _CLOCK = (VARIANT, "step", "time")
 def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
     """Return a metric at each moment: columns `variant`, `day`, `value` and the axes.
 
+    `day` is the simulated time since the start of the run, in days.
+
     The first part of the metric's name is the table, the last part the column, and the parts
     between select rows: `ltp_error.ana.tv` is column `tv` of the rows of ana in `ltp_error`.
 
@@ -53,8 +55,15 @@ def over_time(study: "Study", metric: str) -> "pl.DataFrame | None":
         if not texts:
             return None
         rows = rows.filter(pl.any_horizontal(pl.col(c) == selector for c in texts))
-    start = pl.col("time").dt.truncate("1d").min().over(VARIANT)
-    day = (pl.col("time") - start).dt.total_microseconds() / DAY_US
+    step = pl.col("step")
+    time = pl.col("time")
+    step_us = (time.max() - time.min()).dt.total_microseconds() / (step.max() - step.min())
+    midnight = time.dt.truncate("1d").min()
+    # Of one moment alone only the time of day is known.
+    since_midnight = (time - midnight.over(VARIANT)).dt.total_microseconds()
+    has_moments = (step.max() > step.min()).over(VARIANT)
+    elapsed_us = pl.when(has_moments).then(step * step_us.over(VARIANT)).otherwise(since_midnight)
+    day = elapsed_us / DAY_US
     return (
         rows.with_columns(day.alias(DAY), pl.col(column).alias(VALUE))
         .group_by(VARIANT, DAY, *study.columns, maintain_order=True)
