@@ -181,7 +181,7 @@ class LogTable:
     def read(
         cls,
         path: Path,
-        columns: Mapping[str, str],
+        columns: Mapping[str, str] | None,
         usual: Mapping[str, Sequence[str]] = NAMES,
         needed: Sequence[str] = ("time", "x", "y"),
         *,
@@ -192,7 +192,7 @@ class LogTable:
 
         Args:
             path: The file.
-            columns: The names of columns that the user gives.
+            columns: The names of columns that the user gives; None: the user can't give any.
             usual: The names that the column of each quantity may have besides.
             needed: The quantities without which it can't be read.
             decimal_comma: Whether numbers have a comma as decimal mark; None: shown by the file.
@@ -203,7 +203,7 @@ class LogTable:
         """
         rows, line = read_table(path)
         known = rows.column_names
-        named = dict(columns)
+        named = dict(columns or {})
         if len(set(known)) < len(known):
             twice = next(name for name in known if known.count(name) > 1)
             raise LogError(f"{path} has two columns {twice!r}: rename one of them")
@@ -219,16 +219,19 @@ class LogTable:
             name = next((name for name in usual[quantity] if name in bases.values()), "")
             fitting = [column for column in known if bases[column] == name]
             if len(fitting) > 1:
+                rename = "rename the others"
+                say = f"say which it is by columns: {{{quantity}: {fitting[0]}}}"
                 raise LogError(
-                    f"{path} has several columns of {quantity}, {' and '.join(fitting)}: say which"
-                    f" it is by columns: {{{quantity}: {fitting[0]}}}"
+                    f"{path} has several columns of {quantity}, {' and '.join(fitting)}:"
+                    f" {rename if columns is None else say}"
                 )
             if fitting:
                 named[quantity] = fitting[0]
             elif quantity in needed:
+                say = f"Say which it is by columns: {{{quantity}: …}}"
                 raise LogError(
                     f"{path} has no column {quantity!r}; it has: {', '.join(known)}."
-                    f" Say which it is by columns: {{{quantity}: …}}"
+                    f" {'Rename the one that it is' if columns is None else say}"
                 )
         return cls(path, rows, named, line, decimal_comma, day_first)
 

@@ -180,8 +180,8 @@ def test_tables_are_read_as_other_logs_are(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "words"),
     [
-        ({"detected": GOOD["detected"]}, ["no column 'distance'", "it has: detected"]),
-        ({"distance": GOOD["distance"]}, ["no column 'detected'"]),
+        ({"detected": GOOD["detected"]}, ["no column 'distance'", "it has: detected. Rename"]),
+        ({"distance": GOOD["distance"]}, ["no column 'detected'", "Rename the one that it is"]),
         (
             GOOD | {"distance": ["near"] + [1] * (ROWS - 1)},
             ["log.csv, line 2", "distance", "'near'", "number"],
@@ -202,7 +202,7 @@ def test_tables_are_read_as_other_logs_are(tmp_path):
             GOOD | {"bearing_rad": [30] * ROWS},
             ["log.csv, line 2", "bearing_rad", "-6.283 to 6.283"],
         ),
-        (GOOD | {"detected ": GOOD["detected"]}, ["several columns of detected"]),
+        (GOOD | {"detected ": GOOD["detected"]}, ["columns of detected", "rename the others"]),
         (
             GOOD | {"identity": ["ana"] * ROWS, "true_identity": [""] * ROWS},
             ["log.csv, line 2", "true_identity is empty"],

@@ -80,7 +80,7 @@ def read_detections(path: Path) -> DetectionLog:
         InputError: The file can't be read, lacks a column, or has a wrong value; the message names
             the line and the column.
     """
-    table = LogTable.read(path, {}, {name: (name,) for name in COLUMNS}, ("distance", "detected"))
+    table = LogTable.read(path, None, {name: (name,) for name in COLUMNS}, ("distance", "detected"))
     LOG_ROWS.check(len(table.line), path)
     if len(table.line) < MIN_ROWS:
         raise InputError(f"{path} has {len(table.line)} rows: a fit needs at least {MIN_ROWS}")
