@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def may_run_code(simulation: Simulation) -> bool:
-    """Return whether code and programs that its scenario names may run."""
+    """Return whether code and programs named by the scenario may run."""
     return simulation._loop.runs_code
 
 
@@ -34,10 +34,10 @@ def interventions_of(simulation: Simulation) -> list[dict[str, Any]]:
 
 
 def check_intervention(simulation: Simulation, act: Mapping[str, Any]) -> None:
-    """Refuse an intervention that can't be applied at the present step, and apply none.
+    """Refuse an intervention that can't be applied at the present step, without applying any.
 
     Raises:
-        ScenarioError: It is not valid, or names something unknown.
+        ScenarioError: The intervention is not valid, or names something unknown.
         PlacementError: There is no such place, or it can't be reached.
     """
     from fleet2d.engine.world import EngineWorld  # few runs need it
@@ -46,7 +46,7 @@ def check_intervention(simulation: Simulation, act: Mapping[str, Any]) -> None:
 
 
 def stop(simulation: Simulation) -> None:
-    """End what another thread simulates after the present span, as Ctrl-C does.
+    """Interrupt a simulation in another thread after its present span, as Ctrl-C does.
 
     Example:
         >>> import contextlib, threading
@@ -62,13 +62,12 @@ def stop(simulation: Simulation) -> None:
 
 
 def run_until_asked(simulation: Simulation, *names: str) -> list[str]:
-    """Simulate until the first behavior of one of some robots has to choose; see `Policy`.
+    """Simulate until a robot's first behavior, a policy, has to choose; see `Policy`.
 
-    The robots' first behaviors are policies without file. To continue, set `given` of each that
-    is returned.
+    These policies have no file. To continue, set `given` of each returned robot's policy.
 
     Returns:
-        The names of the robots that have to choose at the present step; none at the end.
+        The names of the robots that have to choose at the present step; empty at the end.
     """
     rows = {name: simulation._body(name).row for name in names}
     asked: list[str] = []
@@ -94,7 +93,7 @@ def situation_of(simulation: Simulation, name: str) -> Situation:
 def measured(simulation: Simulation, metric: str) -> dict[str, Any]:
     """Return the result of a metric up to the present step.
 
-    Its next period begins here, so only metrics without rows to store should be asked.
+    The metric's next period begins here, so only metrics without rows to store should be measured.
     """
     state = simulation._state
     state.settle(simulation.step)
@@ -106,7 +105,7 @@ def measured(simulation: Simulation, metric: str) -> dict[str, Any]:
 
 
 def results_so_far(simulation: Simulation) -> dict[str, Any]:
-    """Return the results of all metrics up to the end of their last period; it changes no run."""
+    """Return the results of all metrics up to the end of their last period, changing nothing."""
     return simulation._state.learners.results()
 
 

@@ -1,4 +1,4 @@
-"""The basis of a run: the parts that all share, the watchers of bodies, components and files."""
+"""The basis of a run: scenario, home and bodies, the base of watchers, components and files."""
 
 from collections.abc import (
     Callable,
@@ -37,7 +37,7 @@ T = TypeVar("T")
 
 
 class ImmutableRows(list[T]):
-    """A list of objects that never change: a copy of a run has a list of its own, with the same."""
+    """A list of immutable objects: a copy of a run has its own list of the same objects."""
 
     def __copy__(self) -> Self:
         return self.__class__(self)
@@ -67,15 +67,15 @@ def notes_of(actor: DecidingActor, kind: str) -> list[PlannedNote]:
 class Watcher:
     """Base of followers of the bodies from span to span.
 
-    A span is a block of steps without decisions. A watcher that may have to end one looks ahead in
+    A span is a block of steps without decisions. A watcher that may end a span looks ahead in
     `limit`; all others process many spans at once.
 
     Attributes:
-        next_step: The first step that it has not processed.
+        next_step: The first step that is not processed yet.
         awaited: Kinds of events that end a span, whatever plans wait for.
-        steered: Rows of the bodies whose plans it may replace at any step.
-        files: The files that it has read.
-        hears_plans: Whether it hears of plans that begin and are replaced.
+        steered: Rows of the bodies whose plans the watcher may replace at any step.
+        files: The files that the watcher has read.
+        hears_plans: Whether the watcher is told of plans that begin or are replaced.
     """
 
     hears_plans: ClassVar[bool] = True
@@ -86,12 +86,12 @@ class Watcher:
 
     @property
     def is_needed(self) -> bool:
-        """Whether there is anything in the run for it to follow."""
+        """Whether the run has anything for the watcher to follow."""
         return True
 
     @property
     def waits(self) -> bool:
-        """Whether an event of it may end the present span."""
+        """Whether an event of the watcher may end the present span."""
         return False
 
     def limit(self, bodies: Bodies, end: int) -> int:
@@ -99,7 +99,7 @@ class Watcher:
         return end
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Take in the steps from `next_step` to `end` - 1; return their events."""
+        """Process the steps from `next_step` to `end` - 1; return their events."""
         self.next_step = end
         return ()
 
@@ -114,26 +114,26 @@ class Watcher:
     # Decisions
 
     def looks(self, row: int, step: int) -> bool:
-        """Return whether a body that it steers is asked for a decision at a step."""
+        """Return whether a steered body is asked for a decision at a step."""
         return False
 
     def evasion(self, bodies: Bodies, now: Situation) -> Callable[[], None] | None:
-        """Return what lets a body that it steers follow another plan; None: it may go on."""
+        """Return a function that gives a steered body another plan; None: the body may go on."""
         return None
 
     def before_plan(self, row: int, actor: DecidingActor, step: int) -> None:
-        """Hear that the plan of a body is replaced at a step."""
+        """React to the replacement of a body's plan at a step."""
 
     def listen(self, row: int) -> None:
-        """Hear that a body may wait for other events from now on."""
+        """React to a change of the events that a body waits for."""
 
     def begin_plan(self, actor: DecidingActor) -> None:
-        """Hear that a body begins a plan."""
+        """React to the beginning of a body's plan."""
 
-    # What becomes of a run
+    # Observations and outputs
 
     def settle(self, end: int, observations: SightingTable, readings: Sequence[SensorRow]) -> None:
-        """Take in what was observed up to step `end` - 1, in which the home doesn't change.
+        """Process observations up to step `end` - 1, in which the home doesn't change.
 
         Args:
             end: One past the last step.
@@ -142,7 +142,7 @@ class Watcher:
         """
 
     def learn(self, outputs: "Outputs", results: "Results") -> None:
-        """Take in new outputs of algorithms, and new results of metrics."""
+        """Process new outputs of algorithms, and new results of metrics."""
 
 
 class Cast:
@@ -169,7 +169,7 @@ class Cast:
 
 @dataclass(frozen=True)
 class Basis(Cast):
-    """The scenario, home and bodies from which the parts of a run are made.
+    """The scenario, home and bodies from which the parts of a run are built.
 
     Attributes:
         scenario: The scenario.
@@ -224,7 +224,7 @@ def components_of(scenario: Scenario) -> Iterator[Component]:
     script = scenario.script
     errors = [robot.perception for robot in robots]
     errors += [camera.perception for robot in robots for camera in robot.eyes.values()]
-    errors += [getattr(entry.act, "errs", None) for entry in script]  # of faults
+    errors += [getattr(entry.act, "errs", None) for entry in script]  # faults have errors, too
     entities = (*scenario.users.values(), *robots)
     holders = [scenario, scenario.sight, *entities, *script, *(each for each in errors if each)]
     queue = [component for holder in holders for component in _components_in(holder)]

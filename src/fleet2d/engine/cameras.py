@@ -1,7 +1,7 @@
 """The cameras of a body in a run: their memory from span to span, and their sightings.
 
-The look is compiled. Here are its tables, the effect of interventions on them, and methods of sight
-that are written in Python.
+The look is compiled. This module has its tables, the effect of interventions on them, and methods
+of sight in Python.
 """
 
 import math
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from fleet2d.entities.keep_out import SleepMemory
     from fleet2d.entities.robots.policy import SightingMemory
 
-# Squared distance beyond which a dark camera sees nobody.
+# The squared range of a dark camera, below all distances.
 NO_RANGE = -1
 # The chance of a lens that notices all bodies in view.
 CERTAIN = 2**53
@@ -114,30 +114,30 @@ class Cameras(Watcher):
     Attributes:
         owner: The body with the cameras.
         row: The owner's row among the bodies.
-        index: Its index among the robots, or among the users.
+        index: The owner's index among the robots, or among the users.
         event_names: The event kinds (lost, seen) of these cameras.
         others: The bodies that can be seen.
         names: Names of the cameras.
         errs: Whether observations can differ from the truth.
-        activity_senses: How each camera perceives activities.
-        shared: What it shares with the cameras of other bodies.
+        activity_senses: The perception of activities by each camera.
+        shared: The settings shared with the cameras of other bodies.
         method, radii, heights: See `SightSetup`.
         memory: The memory from span to span.
-        drift: The error of the owner's belief about its own pose; None: it has none.
-        sighting_errors: What changes sightings after the look; None: nothing does.
+        drift: The error of the owner's belief about its own pose; None: no error.
+        sighting_errors: The errors that change sightings after the look; None: no errors.
         perceived: The last perceived place of each identity, (identities, 2); the last row is for
             somebody unknown.
-        awaited: Events that algorithms wait for: they end a span, too.
-        remembered: What its owner remembers of its sightings.
-        next_step: The first step at which it has not looked.
+        awaited: Events that algorithms wait for, which end a span, too.
+        remembered: The owner's memory of its sightings.
+        next_step: The first step at which the cameras have not looked.
         knows_truth: Whether the truth behind its sightings is known.
-        notes: What is to be said about its source.
+        notes: Remarks on the source of sightings.
     """
 
     hears_plans = False
     knows_truth = True
     notes: tuple[str, ...] = ()
-    _levels: tuple[I64, I64, I64]  # of cameras and what they look at, if heights matter
+    _levels: tuple[I64, I64, I64]  # heights of cameras and bodies, if heights matter
 
     def __init__(self, row: int, shared: SightSetup) -> None:
         """Set up the cameras of the body in a row.
@@ -154,7 +154,7 @@ class Cameras(Watcher):
         self._first = 0 if is_robot else users
         self.disturbances: list[Disturbance] = []
         self.activity_senses: list[ActivitySense] = []
-        self.may_err = False  # because of interventions
+        self.may_err = False  # interventions may cause errors
         self.others = actors[:users] if is_robot else actors[users:]
         self.memory = self._set_up()
         self.perceived = np.zeros((len(self.others) + 1, 2), np.int64)
@@ -168,7 +168,7 @@ class Cameras(Watcher):
         self.may_err = self.errs = True
 
     def disturb(self, disturbances: Sequence[Disturbance]) -> None:
-        """Set all disturbances, from the step on at which they look next."""
+        """Set all disturbances, from the next look on."""
         lasting = [each for each in self.disturbances if each.injected is None]
         self.disturbances = list(disturbances)
         is_same = lasting == [each for each in disturbances if each.injected is None]
@@ -176,7 +176,7 @@ class Cameras(Watcher):
         self.memory = carry_over(memory, self.memory, self._forced())
 
     def forget(self) -> list[str]:
-        """Forget who is in view, and looks that aren't known yet; return who was in view."""
+        """Forget the people in view, and sightings not known yet; return the people."""
         in_view = np.flatnonzero(self.memory.seen).tolist()
         names = [self.name_of(identity) for identity in in_view]
         self.memory.seen[:] = 0
@@ -238,7 +238,7 @@ class Cameras(Watcher):
         return self._inject()
 
     def _perceptions_of(self, cameras: Iterable[Camera]) -> list[Perception | None]:
-        """Return the errors of each camera: those of disturbances come before its own."""
+        """Return the errors of each camera; errors of disturbances replace its own."""
         common = getattr(self.owner.entity, "perception", None)  # users have no errors
         perceptions = [camera.perception or common for camera in cameras]
         _check_spots(self.owner, perceptions)
@@ -247,7 +247,7 @@ class Cameras(Watcher):
         return perceptions
 
     def _dim(self) -> None:
-        """Let disturbances darken cameras, or make it less likely that they notice somebody."""
+        """Let disturbances darken cameras, or lower their chance of noticing somebody."""
         self._dark = [c for c, disturbance in self._disturbed() if disturbance.dark]
         self.lenses.widest[self._dark] = NO_RANGE
         self.errors.has_ghosts[self._dark] = 0
@@ -284,7 +284,7 @@ class Cameras(Watcher):
         return new_memory(len(self.names), count, backlog)
 
     def _draw_streams(self) -> None:
-        """Set the random stream of each draw, by names: another user doesn't change the others'."""
+        """Set the random stream of each draw by name, so that further users don't change it."""
         stream = self.owner.stream
         errors = self.errors
         draws = list(UserDraw) if self.errs else [UserDraw.DETECT]
@@ -299,7 +299,7 @@ class Cameras(Watcher):
                 errors.ghost_keys[c, ghost_draw.value] = stream(purpose)
 
     def _sense_activities(self, perceptions: Sequence[Perception | None]) -> None:
-        """Set how each camera perceives activities."""
+        """Set the perception of activities of each camera."""
         latencies = self.lenses.latency.tolist()
         for name, perception, latency in zip(self.names, perceptions, latencies, strict=True):
             keys = [self.owner.stream(f"{name}: activity {other}") for other in self.other_names]
@@ -319,7 +319,7 @@ class Cameras(Watcher):
 
     @property
     def identities(self) -> dict[str, int]:
-        """The identity of each name; the empty one is somebody unknown."""
+        """The identity of each name; the empty name is somebody unknown."""
         return {name: u for u, name in enumerate(self.other_names)} | {"": NOBODY}
 
     @property
@@ -345,7 +345,7 @@ class Cameras(Watcher):
     def in_view(self) -> dict[str, tuple[float, float]]:
         """The last perceived place [m] of each body in view, by name, when it last looked."""
         seen = self.memory.seen.tolist()
-        if 1 not in seen:  # a quick answer, as policies ask for it again and again
+        if 1 not in seen:  # policies ask often, so this case is quick
             return {}
         xy_of = self.owner.home.lattice.xy_of
         places = self.perceived.tolist()
@@ -372,7 +372,7 @@ class Cameras(Watcher):
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
         """Look in the steps from `next_step` to `end` - 1; return the events of seeing and losing.
 
-        Cameras that looked beyond `end`, before another watcher ended the span, look again.
+        Cameras that looked beyond `end` before another watcher ended the span look again.
         """
         result = self._ahead
         self._ahead = None
@@ -400,7 +400,7 @@ class Cameras(Watcher):
         ]
 
     def interruptions(self, events: Sequence[Event]) -> Iterator[tuple[int, SightEvent]]:
-        """Yield the events of the last step that end its owner's plan."""
+        """Yield the events of the last step that end the owner's plan."""
         if not events:
             return
         stops = self.owner.plan.interrupts
@@ -471,10 +471,10 @@ class Cameras(Watcher):
         return Look(looked, end, sightings, newest, events, old_memory)
 
     def _points_seen(self, method: FieldOfView, bodies: Bodies, end: int) -> U64:
-        """Return which points of each body a method of sight sees until a step; see `points_seen`.
+        """Return the points that a method of sight sees until a step; see `points_seen`.
 
         Raises:
-            ComponentError: The method returned something else than it should.
+            ComponentError: The method returned a wrong type or shape.
         """
         first = self.next_step
         block = bodies.block(first, end)
@@ -504,7 +504,7 @@ def _check_spots(owner: Actor, perceptions: Sequence[Perception | None]) -> None
 
 
 def _drift_of(owner: Actor) -> Drift | None:
-    """Return the error of a body's belief about its own pose; None: it has none."""
+    """Return the error of a body's belief about its own pose; None: no error."""
     settings: Localization | None = getattr(owner.entity, "localization", None)
     if settings is None:
         return None
@@ -537,7 +537,7 @@ class PerfectCameras(Cameras):
 
 
 class Look(NamedTuple):
-    """The result of a look up to step `looked` - 1, and the memory before it.
+    """The result of a look up to step `looked` - 1, and the memory before the look.
 
     The span ends at `end`, which is earlier if an error changed who was seen when. `newest` has,
     for each identity, the number of its last sighting among the distinct ones, or -1 for none.
@@ -559,7 +559,7 @@ def end_of_span(
 
 
 def newest_of(rows: I64, identities: int) -> list[int]:
-    """Return of each identity the number of its last row, -1 for none."""
+    """Return the number of the last row of each identity, -1 for none."""
     newest = np.full(identities, -1)
     newest[rows[:, SightingColumn.IDENTITY]] = np.arange(len(rows))  # -1, unknown, is the last
     return newest.tolist()
@@ -574,7 +574,7 @@ def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemor
     Args:
         memory: The new memory, of a robot that has seen nobody.
         old: The memory of the same cameras so far.
-        forced: What each user in view is perceived as from now on, (cameras, users).
+        forced: The identity as which each user in view is perceived from now on, (cameras, users).
     """
     about = old.about.copy()
     about[..., About.FORCED.value] = forced

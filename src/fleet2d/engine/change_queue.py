@@ -1,8 +1,8 @@
 """Changes of the home during a run: their times and order, and the bodies that they stop.
 
-Known changes wait in a queue by step: those of scripts, doors by their schedule, doors on the
-way of a body, and doors that close by themselves; so do the steps at which people may switch
-lights. Changes are made before decisions in a step, so they hold for all bodies in it.
+A queue holds known changes by step: changes by scripts, scheduled doors, doors on the way of a
+body, doors that close by themselves, and steps at which people may switch lights. Changes are made
+before decisions in a step, so they hold for all bodies in it.
 """
 
 import heapq
@@ -36,7 +36,7 @@ NOWHERE = -1
 
 
 def switch(home: Home, rooms: Sequence[int], step: int, *, is_on: bool) -> list[Event]:
-    """Switch the lights of rooms; return an event for each that was not so already."""
+    """Switch the lights of rooms; return an event for each light that changed."""
     kind = EventKind.LIGHT_ON if is_on else EventKind.LIGHT_OFF
     changed = [room for room in rooms if (room in home.unlit) == is_on]
     home.set_lights(changed, is_on=is_on)
@@ -46,9 +46,10 @@ def switch(home: Home, rooms: Sequence[int], step: int, *, is_on: bool) -> list[
 class PeopleSwitches:
     """The switches of people with `lights`: each is in one room, or asleep or away.
 
-    All lights are off at first. Who enters a room within the own hours, gets up there, or is there
-    when the hours begin, has the light on; who leaves it or lies down switches it off, unless
-    another one of these people is there awake. Who has to hold still, after a fall, switches none.
+    All lights are off at first. A person who enters a room within the own hours, gets up there, or
+    is there when the hours begin, switches the light on; one who leaves or lies down switches it
+    off, unless another of these people is there awake. People who hold still, as after a fall,
+    switch none.
     """
 
     def __init__(self, basis: Basis) -> None:
@@ -137,7 +138,7 @@ def crossings(track: Breakpoints, line: Segment, *, jumps: bool = True) -> list[
 
 
 def _side_of(line: Segment, x: Any, y: Any) -> Any:
-    """Return on which side of a line points are: above 0 on its left; exact for integers."""
+    """Return the side of a line on which points are: above 0 on its left; exact for integers."""
     (ax, ay), (bx, by) = line
     return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
@@ -163,13 +164,13 @@ class DueChange(NamedTuple):
 
     Attributes:
         step: The step.
-        change: The change; None: the door opens for a body, or closes by itself; or without a
-            door, the body may switch a light.
-        by: The body or thing that causes it, for the table of events.
+        change: The change; None: the door opens for a body or closes by itself or, without a door,
+            the body may switch a light.
+        by: The body or thing that causes the change, for the table of events.
         door: Number of that door; else -1.
         opens_for: Row of the body that the door opens for, and the step of its decision: the
             opening is void if the body has replanned since.
-        passed_us: When the body passes the line of the door [us].
+        passed_us: The time at which the body passes the line of the door [us].
     """
 
     step: int
@@ -202,7 +203,7 @@ class ChangeQueue:
             with errors_as(ScenarioError, f"floorplan.slows.{number}", of=PlacementError):
                 basis.home.plan.check_area(area.area)
         self.home.slows = tuple(area.on(basis.home.lattice) for area in self._floor)
-        # By step; those of one step happen in the order in which they were put into the queue.
+        # Changes by step; those of one step are made in the order of the queue.
         self._queue: list[tuple[int, int, DueChange]] = []
         self._count = 0
         for name, door in self.doors.items():
@@ -229,14 +230,14 @@ class ChangeQueue:
         """Schedule a change that an algorithm or a script requests.
 
         Raises:
-            ComponentError: It names something unknown.
+            ComponentError: The change names something unknown.
         """
         with errors_as(ComponentError, f"{by} requests an impossible change", of=ScenarioError):
             self.check_names(change)
         self._put(DueChange(step, change, by))
 
     def expect(self, row: int, actor: Actor) -> None:
-        """Schedule the doors and lights that a body uses on its way, after it has a new plan."""
+        """Schedule the doors and lights on the way of a body that has a new plan."""
         plan = (row, actor.planned_at)
         for step in self._switches.steps(row, actor):
             self._put(DueChange(step, None, actor.name, opens_for=plan))
@@ -251,7 +252,7 @@ class ChangeQueue:
                 self._put(DueChange(step, None, actor.name, door, plan, moment))
 
     def make(self, step: int) -> list[Event]:
-        """Make all changes that are due at a step; bodies with a blocked way replan.
+        """Make all changes that are due at a step; bodies whose way is blocked replan.
 
         Raises:
             ComponentError: A request of an algorithm or a script is impossible.
@@ -307,7 +308,7 @@ class ChangeQueue:
         return self._turn(door, True, due, step)
 
     def _use(self, door: int, moment_us: int, step: int) -> None:
-        """Note at a step that a door is used at a moment: it may close by itself afterwards."""
+        """Note at a step that a door is used at a moment, after which it may close by itself."""
         after = self.doors[self.names[door]].closes_after
         if after is not None:
             self._used_us[door] = max(self._used_us[door], moment_us)
@@ -356,7 +357,7 @@ class ChangeQueue:
         return np.array(self.home.door_line(door), np.float64)
 
     def _is_blocked(self, shape: F64) -> bool:
-        """Whether a body stands where a shape [lattice units] is to be."""
+        """Return whether a body stands in a shape [lattice units]."""
         units = self.home.lattice.units_per_m
         for actor in self._actors:
             if not actor.state.away:
@@ -366,7 +367,7 @@ class ChangeQueue:
         return False
 
     def _stop(self, step: int, shape: F64 | None, actors: Sequence[Actor] | None = None) -> None:
-        """Make bodies replan that have a blocked way, or walk at random along the walls."""
+        """Make bodies replan if their way is blocked or they walk at random along walls."""
         units = self.home.lattice.units_per_m
         for actor in self._actors if actors is None else actors:
             if not isinstance(actor.motion, Track):
@@ -378,7 +379,7 @@ class ChangeQueue:
                     actor.ask(step)
 
     def _passes(self, actor: Actor, shape: F64) -> bool:
-        """Whether a shape is a door that the body opens."""
+        """Return whether a shape is a door that the body opens."""
         if not actor.entity.opens_doors or len(shape) > 2:
             return False
         door = next(d for d in range(len(self.names)) if np.array_equal(self._door_shape(d), shape))

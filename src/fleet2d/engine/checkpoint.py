@@ -32,17 +32,17 @@ NO_CHECKPOINT = "no checkpoint from step"
 
 # Longest wall time between commits of rows [s]; they are also committed every simulated day.
 COMMIT_S = 2.0
-# `auto`: a checkpoint is written after this much computing [s], or this much wall time [s] in a run
-# that is slowed down; and so rarely that checkpoints take at most 1/40 of the computing.
+# With `auto`, a checkpoint is written after this much computing [s], or this much wall time [s] in
+# a run that is slowed down, and so rarely that checkpoints take at most 1/40 of the computing.
 COMPUTING_S = 10.0
 WAITING_S = 60.0
 SHARE = 40
-# What the signature of a checkpoint is for.
+# The purpose of the signature of a checkpoint.
 PURPOSE = "checkpoint of a run"
 
 
 class UnusableCheckpointError(ArtifactError):
-    """A checkpoint can't be used: the run starts again from its first step."""
+    """A checkpoint can't be used, so the run starts again from its first step."""
 
 
 @dataclass
@@ -63,15 +63,15 @@ class Checkpoint:
 
     @classmethod
     def open(cls, unfinished: UnfinishedRun, manifest: Manifest) -> Self:
-        """Open the checkpoint of a run, if this user wrote it, for just this run.
+        """Open the checkpoint of a run if this user wrote it for this run.
 
-        Its signature covers the whole file: the state, the manifest of that time, and the digest of
-        the journal before it. With that manifest the present one is compared in all that doesn't
-        change while a run goes on, and with that digest the present journal.
+        The signature covers the whole file: the state, the manifest of that time, and the digest of
+        the journal up to it. The present manifest must equal that one in all that doesn't change
+        while a run goes on, and the present journal must have that digest.
 
         Raises:
-            UnusableCheckpointError: There is none, or it is another user's, damaged, or of another
-                run.
+            UnusableCheckpointError: There is no checkpoint, or it is another user's, damaged, or of
+                another run.
         """
         path = unfinished.checkpoint
         if not path.is_file():
@@ -93,7 +93,7 @@ class Checkpoint:
         """Return the state.
 
         Raises:
-            UnusableCheckpointError: It can't be read.
+            UnusableCheckpointError: The state can't be read.
         """
         with errors_as(UnusableCheckpointError, of=ArtifactError):
             return read_state(self.body, constants)
@@ -104,7 +104,7 @@ def _fixed_part(manifest: Manifest, like: Manifest | None = None) -> tuple[objec
 
     Args:
         manifest: The manifest.
-        like: An earlier one: of what only grows, the part that it has; None: all.
+        like: An earlier manifest, to whose length growing fields are cut; None: no cut.
     """
     earlier = like or manifest
     outside = [record for record in manifest.interventions if is_from_outside(record)]
@@ -141,7 +141,8 @@ class CheckpointWriter:
             store: The tables of the run.
             settings: How often checkpoints are written.
             clock: The clock of the run.
-            describe: Returns the constants of the run by name, and the header of a checkpoint.
+            describe: A function that returns the constants of the run by name, and the header of a
+                checkpoint.
         """
         self._store = store
         self._describe = describe
@@ -206,7 +207,7 @@ class CheckpointWriter:
             journal = self._store.journal_digest()
             header = {**header, "commit": commit, "journal": journal}
             try:
-                seal = signature(PURPOSE)  # before there is a file
+                seal = signature(PURPOSE)  # this may fail, so it comes before the file
 
                 def write(handle: int) -> None:
                     write_snapshot(partial(files.write_all, handle), state, constants, header, seal)
@@ -217,7 +218,7 @@ class CheckpointWriter:
                 self._store.manifest.notes.append(
                     f"{NO_CHECKPOINT} {state.bodies.step} on: {error}"
                 )
-        if not self._every:  # rarely
+        if not self._every:  # with `auto`, checkpoints are rare
             release_memory()
         state.recorder.wall_s += time.perf_counter() - began
         now = time.process_time()

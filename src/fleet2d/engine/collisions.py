@@ -1,10 +1,11 @@
 """Collisions: bodies that are about to walk or drive into another one, step by step.
 
-It follows from the poses alone, and the body that moves decides at that step, before it moves, so
-the result doesn't depend on spans. Bodies that block each other wait, go round or squeeze past: a
-body is in the way if one moves towards it, and they would overlap before the next step. Robots that
-give way keep clear of people: a person is in the way if the next move would bring the robot nearer,
-and within its distance; for a robot that goes round people, if the bodies would touch.
+Collisions follow from the poses alone, and the moving body decides at that step, before it moves,
+so results don't depend on spans. Bodies that block each other wait, go round or squeeze past: a
+body is in the way if another moves towards it so that they would overlap before the next step.
+Robots that give way keep clear of people: a person is in the way if the next move would bring the
+robot nearer and within its distance or, for a robot that goes round people, if the bodies would
+touch.
 """
 
 from collections.abc import Callable, Sequence
@@ -60,10 +61,10 @@ Places = tuple[I64, I64, I64 | U8]
 
 
 class BlockedWays(Watcher):
-    """The bodies of a run that block each other's way; it steers all of them."""
+    """The watcher of bodies that block each other's way, which steers all of them."""
 
     def __init__(self, basis: Basis) -> None:
-        """Keep track of bodies if `simulation.people_block` says how long one waits for another."""
+        """Track bodies if `simulation.people_block` sets a time of waiting."""
         self._actors = basis.actors
         self._users = basis.bodies.users
         patience = basis.scenario.simulation.people_block
@@ -93,10 +94,10 @@ class BlockedWays(Watcher):
         return end
 
     def in_way(self, bodies: Bodies, row: int) -> int | None:
-        """Return the row of the body into which one would walk next; None if its way is free."""
+        """Return the row of the body into which a body would walk next; None if its way is free."""
         step = bodies.step
         if bodies.pose_at(row, step)[:2] == bodies.pose_at(row, step + 1)[:2]:
-            return None  # mostly it rests
+            return None  # mostly the body rests
         x, y, _, away = bodies.poses(np.array([step, step + 1])).T
         meeting = self._first_meeting((x, y, away), row, step, np.array([0]))
         return None if meeting is None else meeting[1]
@@ -152,13 +153,13 @@ class BlockedWays(Watcher):
     def _first_meeting(
         self, places: Places, row: int, first: int, columns: I64
     ) -> tuple[int, int] | None:
-        """Return the first of some columns at which another body blocks one, and its row."""
+        """Return the first of some columns at which a body is blocked, and the blocker's row."""
         x, y, away = places
         after = columns + 1
         has_moved = (x[row, after] != x[row, columns]) | (y[row, after] != y[row, columns])
         is_home = (away[row, columns] | away[row, after]) == 0
         moves = columns[has_moved & is_home]
-        # A robot with `gives_way` keeps clear of people by that option.
+        # `gives_way` already keeps a robot clear of people.
         polite = getattr(self._actors[row].entity, "gives_way", None) is not None
         others = np.arange(self._users if polite else 0, len(self._actors))
         others = others[others != row]
@@ -186,16 +187,16 @@ class BlockedWays(Watcher):
 def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -> Bool:
     """Return in which columns a body moves towards others so that they would overlap.
 
-    All move straight from one step to the next. Sums and products of integers are exact if no body
-    moves farther than about 100 m in a step.
+    All bodies move straight from one step to the next. Sums and products of integers are exact if
+    no body moves farther than about 100 m in a step.
 
     Args:
         x: int64 (bodies, steps).
         y: int64 (bodies, steps).
-        row: Of the body.
+        row: Row of the body.
         others: Rows of the others, int64 (n, 1).
         columns: int64 (m,).
-        reach: Distances at which it touches them, int64 (n, 1).
+        reach: Distances at which the body touches them [lattice units], int64 (n, 1).
 
     Returns:
         bool (n, m).
@@ -218,7 +219,7 @@ def _approach(x: I64, y: I64, row: int, others: I64, columns: I64, reach: I64) -
 
 
 class Clearance(Watcher):
-    """Ends plans of robots that give way, when a person comes too near or goes away.
+    """Ends the plan of a robot that gives way when a person comes too near or goes away.
 
     Attributes:
         robots: The robots that give way, by their rows among the bodies.
@@ -310,7 +311,7 @@ class Clearance(Watcher):
     def _first(
         self, robot: DecidingActor, poses: Poses, people: Places, first: int, begin: int
     ) -> tuple[int, int] | None:
-        """Return the first column, from `begin` to the last but one, and the user it drives at."""
+        """Return the first column from `begin` on at which a robot drives at a user, and which."""
         assert isinstance(robot.entity, Robot)
         assert robot.entity.gives_way is not None
         xs, ys, away = people
@@ -318,7 +319,7 @@ class Clearance(Watcher):
         y = poses.y
         moves = np.flatnonzero((x[1:] != x[:-1]) | (y[1:] != y[:-1]))
         moves = moves[moves >= begin]
-        if not len(moves):  # the usual case: it stands
+        if not len(moves):  # mostly the robot stands
             return None
         units = robot.home.lattice.units_per_m
         first_meeting: tuple[int, int] | None = None

@@ -1,7 +1,7 @@
 """Conversations: requests of robots come up, people are addressed, and they answer.
 
-All of it follows from the poses and plans alone, step by step, so it doesn't depend on spans. A
-span ends with each question and answer, and where the robot's plan waits for requests to come up.
+Conversations follow from the poses and plans alone, step by step, so they don't depend on spans. A
+span ends with each question and answer, and with each request for which a robot's plan waits.
 """
 
 import math
@@ -36,7 +36,7 @@ from fleet2d.runtime.determinism import Draws
 from fleet2d.runtime.events import Event, EventKind
 
 LYING = POSTURES.index("lie")
-# Nobody is taken for the person addressed, and nobody notices, from farther away [m].
+# From farther away, nobody is addressed, and nobody notices [m].
 EARSHOT_M = 8.0
 # Half of the field in which a person sees a robot: 100° [1/4096 turn].
 FRONT = TURN * 100 // 360
@@ -52,7 +52,7 @@ class PendingReply(NamedTuple):
 
 
 class DueStart(NamedTuple):
-    """Something that a person starts with a robot at a step: a call, a question, a complaint."""
+    """A contact that a person starts with a robot at a step: a call, a question, a complaint."""
 
     step: int
     user: int
@@ -61,7 +61,7 @@ class DueStart(NamedTuple):
 
 
 class RoomBan(NamedTuple):
-    """A room that a robot keeps out of, until it may enter at a step."""
+    """A room from which a robot is banned until a step."""
 
     until: int
     robot: int
@@ -69,24 +69,24 @@ class RoomBan(NamedTuple):
 
 
 class Conversations(Watcher):
-    """All questions and answers of a run; it does nothing if nobody wants anything.
+    """The watcher of all questions and answers of a run.
 
     Attributes:
         actors: All bodies: users, then robots.
         users: Number of users.
-        queues: What each robot wants, by its row.
-        answers: How each user answers, by row.
+        queues: The requests of each robot, by its row.
+        answers: The model of each user's answers, by row.
         attitudes: The attitude of each user to each robot: truth, by their rows.
-        log: How people answered: truth, for metrics.
+        log: The answers of people: truth, for metrics.
         wanted: The requests that came up, for metrics.
     """
 
     def __init__(self, basis: Basis, interventions: InterventionQueue) -> None:
-        """Set up those of a scenario, and give each robot its queue.
+        """Set up the conversations of a scenario, and give each robot its queue.
 
         Args:
             basis: The basis of the run.
-            interventions: By which people switch robots off.
+            interventions: The queue of interventions, by which people switch robots off.
         """
         self.actors = basis.actors
         self.users = basis.bodies.users
@@ -97,17 +97,17 @@ class Conversations(Watcher):
         self.log: list[AnswerRecord] = []
         self.wanted: list[Wanted] = []
         self._interventions = interventions
-        self._activity: dict[int, str] = {}  # of each user before the present plan
+        self._activity: dict[int, str] = {}  # activity of each user before the present plan
         self._questions: list[PlannedNote] = []  # at the ends of plans that were replaced
         self._replies: list[PendingReply] = []
         self._last: list[tuple[int, SightEvent]] = []
         self._next: int | None = None  # the next step that ends a span; None: unknown
-        self._agenda = 0  # the next step with an answer, the end of a ban, or what people start
-        self._changes: dict[int, dict[str, int]] = {}  # of each queue: when requests come up next
+        self._agenda = 0  # the next step with an answer, the end of a ban, or a start
+        self._changes: dict[int, dict[str, int]] = {}  # by queue: when requests come up next
         self._initiators: list[tuple[int, int]] = []  # users who start something, and robots
-        self._starts: list[DueStart] = []  # today
+        self._starts: list[DueStart] = []  # starts of today
         self._begun_days = 0
-        # By robot: what was accepted last, and when.
+        # The request that was accepted last, and its step, by robot.
         self._accepted: dict[int, tuple[Request, int]] = {}
         self._bans: list[RoomBan] = []
         self._open(basis)
@@ -134,7 +134,7 @@ class Conversations(Watcher):
 
     @property
     def is_needed(self) -> bool:
-        """Whether any robot wants something of people."""
+        """Whether any robot has requests to people."""
         return bool(self.queues)
 
     waits = is_needed
@@ -154,7 +154,7 @@ class Conversations(Watcher):
         return min(end, self._next + 1)
 
     def _next_step(self) -> int:
-        """Return the next step at which anything happens that ends a span."""
+        """Return the next step with an event that ends a span."""
         steps = [self._agenda, *(question.step for question in self._questions)]
         for row, changes in self._changes.items():
             robot = self.actors[row]
@@ -165,7 +165,7 @@ class Conversations(Watcher):
         return min(step for step in steps if step >= self.next_step)
 
     def _look_ahead(self) -> None:
-        """Note when anything happens next that doesn't depend on the plans of robots."""
+        """Note the next event that doesn't depend on the plans of robots."""
         steps = [NEVER, *(reply.step for reply in self._replies)]
         steps += [start.step for start in self._starts]
         steps += [ban.until for ban in self._bans]
@@ -184,7 +184,7 @@ class Conversations(Watcher):
         return max(1, micros(duration) // self._clock.step_us)
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Take in the steps up to `end` - 1: only requests change before the last of them."""
+        """Process the steps up to `end` - 1; before the last one, only requests change."""
         first = self.next_step
         self.next_step = end
         self._last = []
@@ -215,7 +215,7 @@ class Conversations(Watcher):
         return events
 
     def _is_quiet(self, step: int) -> bool:
-        """Whether nothing happens up to a step: no question, no answer, and no request changes."""
+        """Return whether no question, answer or change of requests happens up to a step."""
         if self._next is None or step >= self._next:
             return False
         return all(
@@ -225,7 +225,7 @@ class Conversations(Watcher):
     def _change_requests(
         self, row: int, queue: RequestQueue, first: int, step: int
     ) -> Iterator[Event]:
-        """Let the requests of a robot come up and go by, and yield the events of that."""
+        """Open and drop requests of a robot, and yield the events."""
         name = self.actors[row].name
         for change in queue.advance(self._clock.time(step)):
             at = max(self._step_of(change.time), first)
@@ -237,7 +237,7 @@ class Conversations(Watcher):
             yield Event(at, name, change.event, text)
 
     def interruptions(self, events: Sequence[Event]) -> Iterable[tuple[int, SightEvent]]:
-        """Yield the robots with plans that wait for an answer, or for a request that came up."""
+        """Yield the robots whose plans waited for an answer or a request, with the event."""
         for row, event in self._last:
             if event.event in self.actors[row].plan.interrupts:
                 yield row, event
@@ -275,7 +275,7 @@ class Conversations(Watcher):
         reply: Reply | None,
         state: AttitudeState | None,
     ) -> None:
-        """Record how a person has answered, for metrics."""
+        """Record a person's answer for metrics."""
         state = state or AttitudeState(self._clock.start, 0.0, trust=0.0)
         robot = self.actors[question.row]
         request = self.queues[question.row].find(question.text)
@@ -340,7 +340,7 @@ class Conversations(Watcher):
         )
 
     def _room(self, row: int, block: PoseBlock) -> int | None:
-        """Return the index of the room that a body is in at the begin of a block."""
+        """Return the index of the room that a body is in at the start of a block."""
         if block.away[row, 0]:
             return None
         room = self.actors[row].home.plan.room_of_point(*_point(row, block))
@@ -356,7 +356,7 @@ class Conversations(Watcher):
         return self._activity.get(row, "")
 
     def _give(self, pending: PendingReply, step: int, bodies: Bodies) -> list[Event]:
-        """Give an answer: tell the robot, and let it keep to it."""
+        """Give an answer: tell the robot, and let it obey."""
         row = pending.robot
         text = pending.text
         reply = pending.reply
@@ -381,7 +381,7 @@ class Conversations(Watcher):
         return [*events, Event(step, self.actors[row].name, EventKind.TOLD, where)]
 
     def _whereabouts(self, about: int, user: int, block: PoseBlock) -> str:
-        """Return the whereabouts of one person to another: away, their common room, or home."""
+        """Return the answer about a person's whereabouts: away, the common room, or home."""
         if block.away[about, 0]:
             return "away"
         room = self._room(about, block)
@@ -422,9 +422,9 @@ class Conversations(Watcher):
         self._interventions.follow(off, step, by)
 
     def break_off(self, row: int, step: int) -> list[Event]:
-        """End what a robot does with a person, as it goes off at a step; return the event, if any.
+        """Break off a robot's conversation, as it goes off at a step; return the event, if any.
 
-        Nobody hears the answer; what was accepted, but not carried out, is wanted again.
+        Nobody hears the answer; a request that was accepted but not carried out is reopened.
         """
         robot = self.actors[row]
         note = _broken_note(robot, step)
@@ -467,7 +467,7 @@ class Conversations(Watcher):
         return self._step_of(midnight_of(self._clock.start) + day * DAY)
 
     def _start(self, step: int, bodies: Bodies) -> list[Event]:
-        """Let people turn to robots by themselves."""
+        """Let people start contacts with robots."""
         while self._initiators and self._day_begin(self._begun_days) <= step:
             midnight = midnight_of(self._clock.start) + self._begun_days * DAY
             for user, row in self._initiators:
@@ -489,7 +489,7 @@ class Conversations(Watcher):
         return events
 
     def _turn_to(self, start: DueStart, step: int, bodies: Bodies) -> list[Event]:
-        """Let a person call a robot, ask it something, or complain; return what happens."""
+        """Let a person call a robot, ask it something, or complain; return the events."""
         _, user, row, kind = start
         person = self.actors[user]
         robot = self.actors[row]
@@ -523,14 +523,14 @@ class Conversations(Watcher):
 
 
 def _point(row: int, block: PoseBlock) -> LatticePoint:
-    """Return where a body is at the begin of a block [lattice units]."""
+    """Return the position of a body at the start of a block [lattice units]."""
     return int(block.x[row, 0]), int(block.y[row, 0])
 
 
 def _broken_note(robot: DecidingActor, step: int) -> Note | None:
-    """Return what a robot is in the middle of with a person at a step, as its plan notes it.
+    """Return the note about a robot's unfinished business with a person at a step.
 
-    That is a question that it waits to be answered, or what was accepted and isn't carried out.
+    This is a question without an answer yet, or an accepted request that isn't carried out.
     """
     now_us = step * robot.clock.step_us
     if robot.plan.is_over(step):
@@ -547,7 +547,7 @@ def _check_answers_calls(person: DecidingActor, robot: DecidingActor, answers: A
     """Refuse calls of a robot that can't come.
 
     Raises:
-        ScenarioError: None of its behaviors does.
+        ScenarioError: No behavior of the robot does.
     """
     can_come = any(behavior.takes(Command("come")) for behavior in robot.behaviors)
     if answers.initiative.calls and not can_come:

@@ -1,7 +1,7 @@
 """Encounters of people with robots: robots that come near, drive up, stay too close, or call.
 
-They follow from the poses alone, step by step, so they don't depend on spans. A span ends with the
-first of them, and the person decides right after it.
+Encounters follow from the poses alone, step by step, so they don't depend on spans. A span ends
+with the first one, and the person decides right afterwards.
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,7 +22,7 @@ from fleet2d.runtime.events import Event, EventKind
 FAR = 1 << 50
 LYING = POSTURES.index("lie")
 STANDING = POSTURES.index("stand")
-# A robot is noticed again after it was farther away than these multiples of the distance.
+# A robot is noticed again once it was farther away than these multiples of the distance.
 AGAIN_NEAR = (5, 4)
 AGAIN_COMING = (3, 2)
 
@@ -43,10 +43,10 @@ class Pair:
     Attributes:
         user: The person.
         robot: The robot.
-        attention: What the person notices.
-        near: Whether the person would notice the robot nearby: not if it has stayed there.
-        coming: Whether the person would notice the robot driving up: not if it has just done so.
-        close_steps: Number of steps for which it has been too close.
+        attention: The distances at which the person notices robots.
+        near: Whether the person would notice the robot nearby; not if it has stayed there.
+        coming: Whether the person would notice the robot driving up; not if it has just done so.
+        close_steps: Number of steps for which the robot has been too close.
         distance: Squared distance at the last step [lattice units²].
         at: Place of the robot at the last step [lattice units].
     """
@@ -71,7 +71,7 @@ class Pair:
         return [Encounter(c, kind, self.robot, self) for kind, c in kinds.items() if c is not None]
 
     def hears(self, call: PlannedNote, column: int) -> bool:
-        """Whether the person is called by the robot in a column of the scanned span, and hears."""
+        """Return whether the person hears a call of the robot in a column of the scanned span."""
         limit = self.attention.hears
         if call.row != self.robot.row or call.text not in ("", self.user.name):
             return False
@@ -100,7 +100,7 @@ class Pair:
         return np.where(is_unreachable, FAR, dx * dx + dy * dy)
 
     def _armed(self, limit: int, factor: tuple[int, int], before: bool) -> Bool:
-        """Return where the person would notice the robot again, as it has been farther away."""
+        """Return the columns in which the person would notice the robot again."""
         far = limit * factor[0] // factor[1]
         return np.logical_or.accumulate(self.distances > far * far) | before
 
@@ -162,7 +162,7 @@ class Encounters(Watcher):
         self._robots = robots
         pairs = ((user, robot) for user in users for robot in robots)
         self.pairs = [Pair(u, r, u.attention) for u, r in pairs if u.attention is not None]
-        self._calls: list[PlannedNote] = []  # of users, at the ends of plans
+        self._calls: list[PlannedNote] = []  # calls of users, at the ends of plans
         self._ahead: list[Encounter] = []
         self._last: list[tuple[int, DecidingActor, SightEvent]] = []
 
@@ -193,7 +193,7 @@ class Encounters(Watcher):
         return min((event.column + first + 1 for event in self._ahead), default=end)
 
     def take(self, bodies: Bodies, end: int) -> Sequence[Event]:
-        """Take in the steps up to `end` - 1."""
+        """Process the steps up to `end` - 1."""
         first = self.next_step
         count = end - first
         self.next_step = end

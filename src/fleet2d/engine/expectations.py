@@ -190,7 +190,7 @@ class RunExpectations(Watcher):
 
     @property
     def are_decided(self) -> bool:
-        """Whether nothing can change the verdicts any more, before the end of the run."""
+        """Whether nothing before the end of the run can change the verdicts any more."""
         return all(
             self.first > entry.since
             and is_decided(entry.expectation, self._signals(entry, ended=False))

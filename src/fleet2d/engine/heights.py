@@ -1,4 +1,4 @@
-"""Heights of cameras, bodies and furniture: of a person behind a sofa one sees the head."""
+"""Heights of cameras, bodies and furniture: a person behind a sofa is seen by the head."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import cycle, islice
@@ -14,8 +14,8 @@ from fleet2d.floorplan.placed_objects import PlacedObject
 from fleet2d.kernels import I64, TURN, UNIT, Heights, cosine, in_radians, rounded, sine
 from fleet2d.sight.camera import Camera
 
-# Where the head, the eyes and a robot's camera are, as a share of the height of a body; and where
-# the other points of a body are, in turn.
+# The height of the head, the eyes and a robot's camera, as a share of a body's height; and those of
+# the other points of a body, in turn.
 HEAD = 15 / 16
 AROUND = (3 / 4, 1 / 2, 1 / 4)
 # The height of a seat [m], and of a sitting person above it, as a share of the body's height.
@@ -23,7 +23,7 @@ SEAT_M = 0.45
 SITTING = 0.52
 # The height of a lying person above the furniture [m].
 LYING_M = 0.25
-# Furniture whose back is as high as it is, with a seat before it, and the depth of the back [m].
+# Furniture with a seat in front of a back of full height, and the depth of the back [m].
 WITH_BACK = {"sofa", "armchair"}
 BACK_M = 0.25
 
@@ -36,7 +36,7 @@ class BodyHeights:
     """
 
     def __init__(self, actors: Sequence[Actor]) -> None:
-        """Take the heights of the bodies of a run."""
+        """Compute the heights of the bodies of a run."""
         tall = np.array([actor.entity.tall for actor in actors])
         postures = [tall, SEAT_M + SITTING * tall, np.minimum(LYING_M, tall)]
         self.tops = _millimetres(np.stack(postures, axis=1))
@@ -50,7 +50,7 @@ class BodyHeights:
         Args:
             row: The row of the body.
             cameras: Its cameras.
-            others: The rows of the bodies that it looks at.
+            others: The rows of the bodies that the cameras look at.
             points: Points of each body that are looked at, at most.
         """
         own = self.tops[row]
@@ -63,7 +63,7 @@ class BodyHeights:
         return eyes, by_camera, self.tops
 
     def with_furniture(self, levels: tuple[I64, I64, I64], home: Home) -> Heights:
-        """Return levels with those of the furniture that is in the home at present."""
+        """Return the heights of `levels` with those of the present furniture."""
         if self._furniture[0] is not home.objects:
             self._furniture = home.objects, _stacked(home)
         return Heights(*levels, *self._furniture[1])
@@ -83,8 +83,8 @@ def _stacked(home: Home) -> tuple[I64, I64, I64, I64]:
 def prisms_of(home: Home, thing: PlacedObject) -> Iterator[tuple[I64, float]]:
     """Yield the parts of a piece of furniture that hide low things: outline and height [m].
 
-    Outlines are int64 (corners, 2) [lattice units]. What stands on legs hides nobody, and what
-    blocks sight is a wall already.
+    Outlines are int64 (corners, 2) [lattice units]. Furniture on legs hides nobody, and furniture
+    that blocks sight is a wall already.
     """
     model = FURNITURE.get(thing.type)
     usual = model.height if model else 0.0

@@ -1,4 +1,4 @@
-"""Remarks on what has no effect in a run: settings of sight, behaviors, requests, households."""
+"""Remarks on settings, behaviors, requests and households that have no effect in a run."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -47,7 +47,7 @@ def _switched_by(scenario: Scenario) -> set[str]:
 
 
 def unasked_interactions(actors: Sequence[Actor]) -> Iterator[str]:
-    """Yield a remark on each robot that wants something of people and has no way to ask for it."""
+    """Yield a remark on each robot with requests to people and no behavior that asks."""
     for actor in actors:
         if actor.requests is None or not actor.behaviors or is_own(actor):
             continue

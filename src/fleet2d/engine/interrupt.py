@@ -1,7 +1,7 @@
 """Interrupts: conditions that end plans when they become true, and the plans that wait for them.
 
-They follow from the poses alone, step by step, so they don't depend on spans. A span ends with the
-first of them, and the body decides right after it.
+Interrupts follow from the poses alone, step by step, so they don't depend on spans. A span ends
+with the first one, and the body decides right afterwards.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ class SpanView:
 
     Attributes:
         actor: The body whose plan waits for the interrupt.
-        actors: All bodies: users, then robots. They are in the home `actor.home`.
+        actors: All bodies: users, then robots; all in the home `actor.home`.
         users: The number of users.
         first: The first step.
         poses: The poses of all bodies, (bodies, steps): row b is that of `actors[b]`.
@@ -45,12 +45,12 @@ class SpanView:
 
 
 class Interrupt(Component):
-    """A condition that ends the plans that wait for it, when it becomes true.
+    """A condition that ends waiting plans when it becomes true.
 
-    A plan waits for it by `plan.interrupt_on(name)`, a behavior by `listens`. It happens at a step
-    at which the condition holds, and at the step before it didn't; the behavior is asked at the
-    step after. A condition that holds when the plan begins has to end before it can happen. It has
-    no keys, and whether it holds must follow from the arguments of `holds` alone.
+    A plan waits for an interrupt by `plan.interrupt_on(name)`, a behavior by `listens`. It happens
+    at a step at which the condition holds and didn't hold at the step before; the behavior is asked
+    at the step after. A condition that holds when the plan begins has to end first. An interrupt
+    has no keys, and `holds` must depend on its arguments alone.
     """
 
     kind = "interrupt"
@@ -65,7 +65,7 @@ WATCHED_EVENTS = frozenset({*User.sight_events, *Robot.sight_events, *Robot.requ
 
 
 class Interruptions(Watcher):
-    """The plans that wait for interrupts; it does nothing while there are none.
+    """The watcher of plans that wait for interrupts.
 
     Attributes:
         files: The files of the user's own interrupts for which plans waited.
@@ -74,9 +74,9 @@ class Interruptions(Watcher):
     def __init__(self, basis: Basis) -> None:
         self._actors = basis.actors
         self._users = basis.bodies.users
-        # Whether the condition held at the last step; None: the plan has not begun yet.
+        # This says whether the condition held at the last step; None: the plan has not begun yet.
         self._held: dict[Wait, bool | None] = {}
-        self._ahead: dict[Wait, Bool] = {}  # whether it holds in the present span
+        self._ahead: dict[Wait, Bool] = {}  # steps of the present span at which it holds
         self._last: list[Wait] = []
         self._interrupts: dict[str, Interrupt] = {}
         self.files: list[Path] = []
@@ -148,10 +148,10 @@ class Interruptions(Watcher):
 
 
 def _checked(name: str, holds: Bool, steps: int) -> Bool:
-    """Return the answer of an interrupt.
+    """Return the answer of an interrupt after checking it.
 
     Raises:
-        ComponentError: It is not an array of that many booleans.
+        ComponentError: The answer is not an array of that many booleans.
     """
     shape = getattr(holds, "shape", None)
     if shape != (steps,) or holds.dtype != np.bool_:

@@ -1,9 +1,9 @@
-"""Interventions in a run: when each is applied, its record in the manifest.
+"""Interventions in a run: the steps at which they are applied, and their records in the manifest.
 
 Interventions from outside are recorded with their steps, so that a run can be repeated from its
-manifest. Those of the scenario's script are recorded for readers, with their place in the script:
-when the run is repeated, the scenario applies them again. The manifest of an unfinished run has the
-requests from outside, also those that still wait for a time or an event.
+manifest. Interventions of the scenario's script are recorded for readers, with their place in the
+script, since the scenario applies them again when the run is repeated. The manifest of an
+unfinished run has all requests from outside, even if they still wait for a time or an event.
 """
 
 from bisect import insort
@@ -22,8 +22,8 @@ from fleet2d.interventions.intervention import (
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.events import Event
 
-# The order at one step: first the ends of interventions, then those that follow from others, then
-# those of the script and from outside.
+# At one step, interventions end first; then come those that follow from others, those of the
+# script, and those from outside.
 ENDS, FOLLOWS, SCRIPT, OUTSIDE = range(4)
 FOLLOWED = "another intervention"
 """The origin, in the manifest, of interventions that follow from others."""
@@ -35,7 +35,7 @@ class DueIntervention(NamedTuple):
     Attributes:
         step: The step.
         rank: ENDS, FOLLOWS, SCRIPT or OUTSIDE.
-        number: Its order within a rank: its place in the script or among the requests.
+        number: The order within a rank: its place in the script or among the requests.
         act: The intervention.
         by: Its place in the scenario, like "script.0"; empty for one from outside.
     """
@@ -48,12 +48,12 @@ class DueIntervention(NamedTuple):
 
     @property
     def ends(self) -> bool:
-        """Whether it ends at that step, and doesn't begin."""
+        """Whether the intervention ends at that step instead of beginning."""
         return self.rank == ENDS
 
     @property
     def record(self) -> dict[str, Any]:
-        """The entry of the manifest.
+        """The entry in the manifest.
 
         Example:
             >>> from fleet2d.interventions.intervention import parse_intervention
@@ -86,7 +86,7 @@ class PendingIntervention:
 
     @property
     def is_over(self) -> bool:
-        """Whether it no longer waits."""
+        """Whether the intervention no longer waits."""
         return self.last >= 0 and not self.repeats
 
 
@@ -94,11 +94,11 @@ class InterventionQueue:
     """The interventions on a run.
 
     Attributes:
-        done: Records of those that were applied, in order, for the manifest.
-        requests: Records of all that was requested from outside, in order: at once at a step, or
-            at a time or on an event after it.
-        waiting: Those that wait for an event.
-        lasting: Those with a duration that are active, in the order of their begin.
+        done: Records of applied interventions, in order, for the manifest.
+        requests: Records of all requests from outside, in order: at once at a step, or at a time or
+            on an event afterwards.
+        waiting: Interventions that wait for an event.
+        lasting: Active interventions with a duration, in order of beginning.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -109,7 +109,7 @@ class InterventionQueue:
         self._clock = clock
         self._queue: list[DueIntervention] = []
         self._ends = 0
-        self._followed: list[dict[str, Any]] = []  # of `done`, without what was requested at once
+        self._followed: list[dict[str, Any]] = []  # `done`, without immediate requests
 
     def request(self, act: Intervention, step: int) -> None:
         """Schedule an intervention from outside at a step, after all earlier requests."""
@@ -122,12 +122,12 @@ class InterventionQueue:
         insort(self._queue, due, key=lambda due: due[:3])
 
     def follow(self, act: Intervention, step: int, by: str = FOLLOWED) -> None:
-        """Schedule a consequence of another intervention, before all that is due at that step.
+        """Schedule a consequence of another intervention, before all others due at that step.
 
         Args:
-            act: What follows.
+            act: The consequence.
             step: The step.
-            by: From what it follows, for the manifest.
+            by: The origin of the consequence, for the manifest.
         """
         self._ends += 1
         self.add(DueIntervention(step, FOLLOWS, self._ends, act, by))
@@ -144,7 +144,7 @@ class InterventionQueue:
                 if due.ends:
                     self.forget(due.act)
                 else:
-                    # A copy, since it may begin again before it has ended.
+                    # The copy may begin again before the original has ended.
                     act = due.act.model_copy()
                     self.lasting.append(act)
                     due = due._replace(act=act)
@@ -193,7 +193,7 @@ class InterventionQueue:
 
     @property
     def unmet(self) -> list[str]:
-        """Remarks on entries of the script whose event hasn't come."""
+        """Remarks on entries of the script whose event hasn't happened."""
         return [
             f"{waiting.due.by}: {waiting.due.act.type_name} was never applied: no"
             f" {waiting.trigger} came"
@@ -202,7 +202,7 @@ class InterventionQueue:
         ]
 
     def take_events(self, events: Sequence[Event]) -> None:
-        """Schedule entries that wait for one of these events: at the step after it, or later.
+        """Schedule entries that wait for one of some events, at the step after it or later.
 
         Of several such events at one step, only the first counts.
         """
@@ -219,15 +219,15 @@ class InterventionQueue:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """Records of an unfinished run: what has followed from a script or request, and requests.
+        """Records of an unfinished run: consequences of a script or request, and requests.
 
-        An intervention that was requested to happen at once is its request.
+        A request to happen at once is its own record.
         """
         return [*self._followed, *self.requests]
 
 
 def read_record(content: Mapping[str, Any]) -> tuple[int, dict[str, Any]]:
-    """Return the step of a record in a manifest, and what happens as `parse_intervention` reads it.
+    """Return the step of a record in a manifest, and its content for `parse_intervention`.
 
     Example:
         >>> read_record({"do": "replan", "step": 60, "entity": "astro"})
@@ -238,5 +238,5 @@ def read_record(content: Mapping[str, Any]) -> tuple[int, dict[str, Any]]:
 
 
 def is_from_outside(content: Mapping[str, Any]) -> bool:
-    """Whether an intervention came from a caller, not from the scenario's `script`."""
+    """Return whether an intervention came from a caller, not from the scenario's `script`."""
     return "by" not in content

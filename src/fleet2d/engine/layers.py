@@ -41,7 +41,7 @@ def add_layers(home: Home, source: FloorPlanSource) -> None:
 
 
 class LayerBook:
-    """The layers of a run: it records the cells that robots see, and stores layers at their times.
+    """The layers of a run, with the cells that robots have seen; stores each at its times.
 
     Attributes:
         areas: The area that each robot with a camera has seen; empty if no component needs it.
@@ -90,7 +90,7 @@ class LayerBook:
             count = step // self._bin_steps - self._logged_bins
             self._logged_bins += count
             if len(bins_of_areas) == self._robots == 1:
-                log.expose_bins(bins_of_areas[0][:, np.newaxis])  # no copy
+                log.expose_bins(bins_of_areas[0][:, np.newaxis])  # a view of one area needs no copy
             else:
                 bins = np.zeros((count, self._robots, 2, len(self._patches.room)), np.int64)
                 for area, rows in zip(self.areas, bins_of_areas, strict=True):
@@ -103,8 +103,8 @@ class LayerBook:
             log.expose(step, exposure)
 
     def next_due(self, step: int) -> int | None:
-        """Return the next step after `step` before which a layer is stored; None for none."""
-        if not self._home.layers:  # a quick answer, as every span needs it
+        """Return the next step after `step` before which a layer is stored; None: none."""
+        if not self._home.layers:  # every span asks, so this case is quick
             return None
         periods = [self._period(layer) for layer in self._home.layers.values()]
         dues = [every * (step // every + 1) for every in periods if every]

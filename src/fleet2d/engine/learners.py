@@ -44,10 +44,10 @@ class Learner:
         table: The name of the table of its outputs.
         kinds: The kinds of that table's columns; empty before the first output.
         spec: That table; None before the first output.
-        since: First step of its next history.
-        back: Number of steps before that which it may also read.
+        since: First step of the next history.
+        back: Number of earlier steps that it may also read.
         is_updated: Whether it has been updated.
-        known_from: The first step of which it knows anything: it lost all before.
+        known_from: The first step of which it knows anything; earlier ones were lost.
     """
 
     name: str
@@ -65,12 +65,12 @@ class Learner:
 
     @property
     def oldest(self) -> int:
-        """The first step that it may still read."""
+        """The first step that the learner may still read."""
         return max(0, self.since - self.back)
 
     @property
     def due(self) -> int | None:
-        """The step before which it is updated next: its history ends with the step before.
+        """The step after the last one of the next history.
 
         None if events update it.
         """
@@ -84,7 +84,7 @@ class Learners:
         outputs: The latest output of each algorithm, by name.
         fresh: The outputs of the last update.
         known: The names of all algorithms.
-        replaced: Outputs that all but metrics read instead, by name; WITHHELD for none.
+        replaced: Outputs that all but metrics read instead, by name; WITHHELD: none.
         readable_outputs: The outputs for behaviors.
     """
 
@@ -115,7 +115,7 @@ class Learners:
         self.awaited = frozenset(event for learner in self.all for event in learner.component.on)
 
     def results_at(self, step: int) -> dict[str, Callable[[], Any]]:
-        """Return how to read the results of the metrics that were updated at a step, by name."""
+        """Return functions for the results of the metrics updated at a step, by name."""
         return {
             each.name: each.component.result
             for each in self.all
@@ -135,7 +135,7 @@ class Learners:
         self.readable_outputs = Outputs(self._as_read(self.outputs), self.known)
 
     def _as_read(self, outputs: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return outputs as all but metrics read them."""
+        """Return the outputs that all but metrics read."""
         if not self.replaced:
             return outputs
         merged = {**outputs, **self.replaced}
@@ -161,17 +161,17 @@ class Learners:
 
         Raises:
             InputError: The file is damaged.
-            ComponentError: The algorithm can't use what it holds.
+            ComponentError: The algorithm can't use the content.
         """
         learner = next(learner for learner in self.all if learner.path == f"algorithms.{name}")
         learner.component = self._start(learner.path, learner.origin, learned)
 
     def reboot(self, step: int, keeps: Callable[[str], bool]) -> None:
-        """Let algorithms lose at a step what doesn't outlast the time in which no robot was on.
+        """Let algorithms lose state that doesn't outlast a time in which no robot was on.
 
         Args:
             step: The step.
-            keeps: Whether an algorithm, by its name, keeps what it has learned.
+            keeps: Tells whether an algorithm, by its name, keeps its learned state.
         """
         self.outputs = dict(self.outputs)  # a new mapping: others may hold the old one
         for learner in self.all:
@@ -204,19 +204,19 @@ class Learners:
 
     def next_due(self) -> int | None:
         """Return the step before which the next update is due; None if none is."""
-        return self._due  # precomputed, as every span needs it
+        return self._due  # every span asks for it
 
     def _earliest_due(self) -> int | None:
         dues = (learner.due for learner in self.all)
         return min((due for due in dues if due is not None), default=None)
 
     def update(self, end: int, log: Log, events: Sequence[Event] = ()) -> None:
-        """Update all whose period ends before step `end`, or that wait for one of these events."""
+        """Update learners whose period ends before step `end`, or that wait for an event."""
         fresh: dict[str, Any] = {}
         for learner in self.all:
             if learner.due == end or self._waits_for(learner, events):
                 learner.is_updated = True
-                component = learner.component  # metrics come last, and read all
+                component = learner.component  # metrics come last, and read all outputs
                 reads = component.reads if isinstance(component, Algorithm) else fresh
                 newer = {name: fresh[name] for name in reads if name in fresh}
                 inputs = {**self.outputs, **newer}
@@ -232,7 +232,7 @@ class Learners:
         self._show_outputs()
 
     def _waits_for(self, learner: Learner, events: Sequence[Event]) -> bool:
-        """Whether one of these events updates an algorithm or a metric."""
+        """Return whether one of some events updates an algorithm or a metric."""
         is_metric = isinstance(learner.component, Metric)
         return any(
             event.event in learner.component.on
@@ -241,7 +241,7 @@ class Learners:
         )
 
     def measure(self, name: str, end: int, log: Log) -> dict[str, Any]:
-        """Update a metric before its period is over; return its result up to step `end` - 1."""
+        """Update a metric before the end of its period; return its result up to step `end` - 1."""
         learner = next(each for each in self.all if each.path == f"metrics.{name}")
         if learner.since < end:
             self._update(learner, end, log, self.outputs)
@@ -263,7 +263,7 @@ class Learners:
         return results
 
     def idle_notes(self) -> list[str]:
-        """Return notes about learners that were never updated, because no event happened."""
+        """Return notes on learners that no event has updated."""
         return [
             f"{learner.path} was never updated: no {' or '.join(learner.component.on)} happened"
             for learner in self.all
@@ -323,7 +323,7 @@ class Learners:
             return
         kinds = {name: KINDS[values.dtype.kind] for name, values in columns.items()}
         if not len(next(iter(columns.values()))):
-            return  # without values even the kinds of the columns are unknown
+            return  # without rows, even the kinds of the columns are unknown
         if learner.spec is None:
             learner.kinds = kinds
             own = (Column(name, kind) for name, kind in kinds.items())
@@ -331,7 +331,7 @@ class Learners:
             columns_of_table = (Column("step", "step"), time, *own)
             learner.spec = TableSpec(learner.table, columns_of_table)
         _check_kinds(learner, kinds)
-        self.store.add_table(learner.spec)  # that of a branch doesn't have it yet
+        self.store.add_table(learner.spec)  # the store of a branch doesn't have the table yet
         self.store.append(learner.table, step=step, time=self.clock.stamp(step), **columns)
 
 
@@ -349,7 +349,7 @@ def check_result(result: Any, where: str = "result()") -> Any:
     """Return the result of a metric: numbers and texts, in mappings and lists of any depth.
 
     Raises:
-        ComponentError: It contains something else, or a number that isn't finite.
+        ComponentError: The result contains something else, or a number that isn't finite.
     """
     if isinstance(result, Mapping):
         return {str(k): check_result(value, f"{where}[{k!r}]") for k, value in result.items()}
@@ -386,7 +386,7 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
     """Return the algorithms in an order in which each follows those that it reads.
 
     Raises:
-        ScenarioError: One reads an unknown algorithm, or they read each other in a cycle.
+        ScenarioError: An algorithm reads an unknown one, or they read each other in a cycle.
     """
     for name, algorithm in algorithms.items():
         for source in algorithm.reads:
@@ -402,5 +402,5 @@ def update_order(algorithms: Mapping[str, Algorithm]) -> list[str]:
 
 
 def _is_marked(output: Any, mark: str) -> bool:
-    """Whether an output is a mark, FROZEN or WITHHELD: no algorithm's output is bare text."""
+    """Return whether an output is a mark, FROZEN or WITHHELD; real outputs aren't bare text."""
     return isinstance(output, str) and output == mark

@@ -29,7 +29,7 @@ from fleet2d.runtime.memory import rare_collections
 if TYPE_CHECKING:
     from fleet2d.engine.checkpoint import CheckpointWriter
 
-# Fewer steps are simulated without a handler for Ctrl-C: they end before a user could press it.
+# Fewer steps end before a user could press Ctrl-C, so they are simulated without a handler.
 SHORT = 100
 # Wall time between two reports of progress [s].
 REPORT_S = 0.1
@@ -48,7 +48,7 @@ class Span:
     Attributes:
         first: The step at which decisions are due.
         end: The step before which it ends at the latest.
-        settles: Whether all watchers process it now, or later with other spans.
+        settles: Whether all watchers process it now instead of later with other spans.
     """
 
     first: int
@@ -59,7 +59,8 @@ class Span:
 def intervene(state: State, span: Span) -> None:
     """Apply the interventions that are due at this step.
 
-    One that has become impossible since it was requested is left out, with a note in the manifest.
+    An intervention that has become impossible since its request is left out, with a note in the
+    manifest.
     """
     due = state.interventions.next_due()
     if due is None or due > span.first:
@@ -79,7 +80,7 @@ def intervene(state: State, span: Span) -> None:
             source = item.by or f"the intervention {item.act.type_name}"
             what = f"the end of {source}" if item.ends else source
             state.store.manifest.notes.append(f"step {span.first}: {what} was left out: {error}")
-    if state.interventions.waiting:  # maybe for fewer events now
+    if state.interventions.waiting:  # fewer events may be awaited now
         state.wait_for(state.requested)
 
 
@@ -97,7 +98,7 @@ def decide(state: State, span: Span) -> None:
     step = span.first
     yielding = state.yielding
     rows = () if yielding is None else yielding.rows
-    begun: set[int] = set()  # robots whose plans may still be replaced, as others are in their way
+    begun: set[int] = set()  # robots whose plans may still be replaced
     for row in _asked(state, step):
         begins = _decide(state, row, step)
         if begins and row in rows:
@@ -125,7 +126,7 @@ def _decide(state: State, row: int, step: int) -> bool:
         state.pending.pop(row, None)
         begins = not actor.keeps_plan(situation)
         for watcher in state.listening:
-            watcher.listen(row)  # for other events, if other behaviors listen now
+            watcher.listen(row)  # other behaviors may listen for other events now
     if begins:
         state.end_plan(row, step)
         actor.decide(situation)
@@ -166,7 +167,7 @@ def _evade(state: State, watcher: Watcher, row: int, step: int, *, begins: bool)
 
     Args:
         state: The state.
-        watcher: What steers the body.
+        watcher: The watcher that steers the body.
         row: The row of the body.
         step: The present step.
         begins: Whether it begins a new plan at this step.
@@ -234,7 +235,7 @@ def record(state: State, span: Span) -> None:
 
 
 def learn(state: State, span: Span) -> None:
-    """Update the algorithms and metrics that are due, and store the layers that are due."""
+    """Update the algorithms and metrics, and store the layers, that are due."""
     if not span.settles:
         return
     if state.log is not None:
@@ -289,8 +290,8 @@ class Loop:
         self.simulate_s = self.save_s = 0.0
         self._step_us = clock.step_us
         self._keeper = keeper
-        self.runs_code = may_run_code()  # also what a plan names, which is imported when it begins
-        self._began: float | None = None  # set while it simulates
+        self.runs_code = may_run_code()  # plans that begin may import code, too
+        self._began: float | None = None  # set during `run`
 
     @property
     def running_s(self) -> float:
@@ -446,8 +447,8 @@ def deferred_interrupt(stop: Callable[[], None]) -> Iterator[None]:
     def on_signal(number: int, _: Any) -> None:
         stop()
         restore()
-        # Not by sys.stderr, whose methods the signal may have interrupted. If stderr was closed,
-        # its number may be that of another file.
+        # The signal may have interrupted a method of sys.stderr. If stderr was closed, its number
+        # may be that of another file.
         if sys.__stderr__ is not None:
             with suppress(OSError):
                 os.write(2, _MESSAGES[signal.Signals(number)])

@@ -1,4 +1,4 @@
-"""What can happen in a run: the kinds of events of each entity, and their details."""
+"""The events that can happen in a run: their kinds by entity, and their details."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -73,14 +73,14 @@ def _kinds_of(
     for behavior in actor.behaviors:
         kinds |= behavior.records
     if is_own(actor):
-        kinds |= KINDS  # it may record any of them
+        kinds |= KINDS  # a class of the user may record any kind
     return frozenset(kinds)
 
 
 def possible_details(
     users: Iterable[Actor], robots: Iterable[Actor], acts: Iterable[Mapping[str, Any]]
 ) -> dict[str, list[str]]:
-    """Return the details that events can have where all are known: by kind, or kind and entity.
+    """Return the possible details of events, where all are known, by kind or kind and entity.
 
     Args:
         users: The users.

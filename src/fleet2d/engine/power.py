@@ -1,4 +1,4 @@
-"""Power of robots in a run: what happens when one is off or on again, and when that is due."""
+"""Power of robots in a run: going off, being on again, and the times of both."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ BY_BATTERY = "its battery"
 
 
 def switch_off(state: State, actor: DecidingActor, step: int) -> None:
-    """Let a robot lose its power at a step: it sees nobody any more, and drops what it wanted."""
+    """Let a robot lose its power at a step: it sees nobody and drops its requests."""
     from fleet2d.engine.conversations import Conversations  # few runs need them
 
     state.settle(step)
@@ -58,14 +58,14 @@ def switch_on(state: State, actor: DecidingActor, step: int) -> bool:
 
 
 def _set_charge_off(actor: DecidingActor, step: int, *, is_off: bool) -> None:
-    """Let the charge of a robot no longer fall, or fall again."""
+    """Stop or restart the discharge of a robot's battery."""
     if actor.charge is not None:
         actor.charge.follow(actor.motion, step * actor.clock.step_us)
         actor.charge.is_off = is_off
 
 
 def _was_carried(actor: DecidingActor, step: int) -> bool:
-    """Return whether a robot isn't where it went off; then it believes to be there."""
+    """Return whether a robot was carried from where it went off; then it believes itself there."""
     before = actor.off_at
     after = actor.state
     if before == after:
@@ -78,7 +78,7 @@ def _was_carried(actor: DecidingActor, step: int) -> bool:
 
 
 def follow_charge(queue: InterventionQueue, actor: DecidingActor, step: int) -> None:
-    """Switch a robot off in the next step if its battery is empty now, or on if it isn't any more.
+    """Switch a robot off in the next step if its battery is empty, or on again if charged.
 
     Args:
         queue: The interventions of the run.
@@ -98,14 +98,14 @@ def follow_charge(queue: InterventionQueue, actor: DecidingActor, step: int) -> 
     queue.follow(act, step + 1, BY_BATTERY)
 
 
-# What is due by itself
+# Random and dated failures
 
 
 def schedule_failures(state: State, scenario: Scenario, clock: Clock, seed: int) -> None:
     """Schedule crashes and updates of robots, and failures of cameras and sensors.
 
     Raises:
-        ScenarioError: One isn't within the run, or a robot is to keep something unknown.
+        ScenarioError: A failure isn't within the run, or a robot is to keep something unknown.
     """
     for name, robot in scenario.robots.items():
         path = f"robots.{name}"
@@ -130,7 +130,7 @@ def schedule_failures(state: State, scenario: Scenario, clock: Clock, seed: int)
 
 
 def _power_acts(name: str, power: Power) -> "Iterator[tuple[SetPower, Failures | Updates]]":
-    """Yield what switches a robot off by itself, and when."""
+    """Yield the interventions that switch a robot off by itself, and their times."""
     from fleet2d.interventions.robots import SetPower  # few robots crash
 
     if power.crashes is not None:
@@ -142,7 +142,7 @@ def _power_acts(name: str, power: Power) -> "Iterator[tuple[SetPower, Failures |
 def _schedule(
     state: State, act: Intervention, due: Failures | Updates, clock: Clock, seed: int, path: str
 ) -> None:
-    """Schedule an intervention whenever it is due, by the random stream of its owner."""
+    """Schedule an intervention at all of its times, by the random stream of its owner."""
     owner, _, purpose = path.rpartition(".")
     with errors_as(ScenarioError, path, of=ScenarioError):
         steps = due.steps(clock, stream_key(seed, owner, purpose))

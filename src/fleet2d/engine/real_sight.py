@@ -1,4 +1,4 @@
-"""Sight of robots whose perception is real: detections from a log, or as they arrive."""
+"""Sight of robots with real perception: detections from a log, or as they arrive."""
 
 from collections.abc import Sequence
 
@@ -14,14 +14,14 @@ from fleet2d.kernels import I64, NOBODY, TURN, UNKNOWN_TRUTH, SightMemory, round
 from fleet2d.kernels import SightingColumn as Column
 from fleet2d.sight.camera import FalseSighting
 
-# A look that may end a span sees no farther ahead, so that many events in a row cost little.
+# A look that may end a span sees only this far ahead, so that many events in a row cost little.
 MAX_AHEAD = 1 << 12
 
 
 class RealSight(Cameras):
     """The cameras of a robot that perceives the sightings of a source of evidence.
 
-    The cameras say what it watched; whom it perceived is the source's, or also the source's.
+    The cameras tell which area was watched; sightings come from the source, or also from it.
     """
 
     def __init__(self, row: int, shared: SightSetup, source: EvidenceSource) -> None:
@@ -39,7 +39,7 @@ class RealSight(Cameras):
         self.notes = self.source.notes
 
     def receive(self, step: int, sightings: Sequence[FalseSighting]) -> None:
-        """Take in the perceptions of a real robot at a step that it has not looked at."""
+        """Add the perceptions of a real robot at a step without a look yet."""
         source = self.source
         lattice = self.owner.home.lattice
         assert isinstance(source, LiveDetections)
@@ -75,7 +75,7 @@ class RealSight(Cameras):
             rows = self._on_map(rows, bodies, first, looked)
         if self.source.besides_cameras:
             rows = np.concatenate([seen.sightings.rows(), rows])
-            rows[len(seen.sightings) :, Column.USER] = NOBODY  # of the simulated people
+            rows[len(seen.sightings) :, Column.USER] = NOBODY  # no simulated person
             rows = rows[np.argsort(rows[:, Column.STEP], kind="stable")]
         patience = self.rule.patience
         events = sight_events(rows, SightMemory(*self.memory), patience, first, looked)

@@ -1,4 +1,4 @@
-"""The recorder of a run: which tables it has, and the rows for them.
+"""The recorder of a run: its tables, and their rows.
 
 Rows are collected over spans and stored in the order of (step, entity), so that the tables don't
 depend on the spans of a run.
@@ -44,9 +44,9 @@ TRUTH_KNOWN = "whether it is known who was there: not for what real robots perce
 ACTIVITY_SAID = "what the user does, if a behavior says so"
 # Events with a user as their detail, which is stored in a column of its own.
 USER_EVENTS = frozenset({EventKind.USER_LOST, EventKind.USER_SEEN})
-# Rows that are collected before they are stored: so many, or more with many bodies.
+# This many rows are collected before they are stored, or more with many bodies.
 MAX_ROWS = 1 << 16
-# Sightings that repeat another one take as much memory as one other row, if they are so many.
+# This many repeated sightings take as much memory as one other row.
 REPEATS_PER_ROW = 8
 UNSTORED = (
     "changes of the home are not in the table of events, as the scenario has none: announce them,"
@@ -61,7 +61,7 @@ class Recorder:
     Attributes:
         activities: The activities of users so far.
         wall_s: Wall time of storing [s].
-        flushes_every_span: Whether rows are stored at once, for those who listen to them.
+        flushes_every_span: Whether rows are stored at once, for listeners.
     """
 
     def __init__(self, basis: Basis, cameras: Sequence[Cameras], sensors: Sensors) -> None:
@@ -108,7 +108,7 @@ class Recorder:
                 codes = [self._camera_names.index(name) for name in group.names]
                 self._camera_codes[group.index] = codes
         self._has_unknown_truth = not all(group.knows_truth for group in cameras)
-        self._count = 0  # observations and readings
+        self._count = 0  # number of observations and readings
         self._most = max(MAX_ROWS, ROWS_PER_BODY * len(basis.actors))
         self.wall_s = 0.0
         self.flushes_every_span = False
@@ -160,7 +160,7 @@ class Recorder:
             self._events += events
         activities = [event for event in events if event[2] == EventKind.ACTIVITY]
         begun = [event for event in activities if event[1] in self._users]
-        if not self.activities.are_perceived:  # then only the present one is asked for
+        if not self.activities.are_perceived:  # only the present activity is needed then
             begun = list({event[1]: event for event in begun}.values())
         for step, entity, _, detail in begun:
             self.activities.begin(self._users[entity], step, detail)
@@ -194,7 +194,7 @@ class Recorder:
         if "key_frames" in self._tables:
             self._keys.collect()
             for row in range(rows):
-                # Not at the last step, whose rows may be stored already: the order would be wrong.
+                # Rows of the last step may be stored already, so these come after it.
                 self._keys.break_off(row, step)
         self.drain()
 
@@ -209,13 +209,13 @@ class Recorder:
         self.wall_s += time.perf_counter() - began
 
     def _drain_observations(self) -> Columns:
-        """Return and remove observations: so many that their columns take little memory."""
+        """Return and remove observations, few enough for their columns to take little memory."""
         counts = accumulate(map(len, self._observations))
         size = next((k for k, count in enumerate(counts, 1) if count > MAX_ROWS), None)
         seen = SightingTable.joined(self._observations[:size] or [NOTHING])
         del self._observations[:size]
         columns = moment_columns(self.clock, seen.step)
-        # Most rows repeat another one at another step: all other columns are made of the others.
+        # Most rows repeat an earlier one but for the step, so columns are made of distinct rows.
         index = seen.index.astype(np.int64)
         o = self._seen(SightingTable.of_rows(seen.distinct))
         for column, values in self._columns_of(o).items():
@@ -231,7 +231,7 @@ class Recorder:
         return Observations(self.home.plan, self._rooms, [table], self.activities)
 
     def _columns_of(self, o: Observations) -> dict[Column, NDArray[Any]]:
-        """Return what observations show at any step, column by column."""
+        """Return the columns of observations that don't depend on the step."""
         has_cameras = bool(self._camera_names)
         user = Column("user", "category", nullable=has_cameras, categories=self._user_names)
         columns: dict[Column, NDArray[Any]] = {
@@ -277,7 +277,7 @@ class Recorder:
         rows = np.array([self._rows[name] for name in entity], np.int32)
         ranks = np.array([RANKS.get(name, 0) for name in kind], np.int8)
         order = np.lexsort((ranks, rows, steps))
-        if not self._stores_home and (rows < 0).any():  # a change by hand, which nobody announced
+        if not self._stores_home and (rows < 0).any():  # a change by hand
             order = order[rows[order] >= 0]
             if UNSTORED not in self.store.manifest.notes:
                 self.store.manifest.notes.append(UNSTORED)
@@ -340,7 +340,7 @@ class Recorder:
 def camera_names(cameras: Sequence[Cameras]) -> tuple[str, ...]:
     """Return the names of all cameras if the table of observations has to name them.
 
-    It does if a robot has several cameras, or cameras that err.
+    They are needed if a robot has several cameras, or cameras that err.
     """
     if not any(group.errs or len(group.names) > 1 for group in cameras):
         return ()

@@ -1,4 +1,4 @@
-"""Repeat a stored run and compare all that both runs stored, or continue an unfinished one."""
+"""Repeat a stored run and compare both, or continue an unfinished one."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ from fleet2d.scenario.load import load_scenario
 from fleet2d.scenario.model import Scenario
 from fleet2d.storage.files import path_in, refuse_links
 
-# The beginning of the note about the messages of a live run, which its repetition doesn't get.
+# A live run has a note on its messages that begins so; its repetition has none.
 LIVE = "live: "
-# Fields that are compared in another way, or are the same for all runs.
+# These fields are compared otherwise, or are the same for all runs.
 _COMPARED_APART = frozenset({"digest", "format", "scenario", "seal", "status", "tables", "notes"})
 
-ONLY_DECISIONS = {  # beside the trajectories, by which the repetition is checked
+ONLY_DECISIONS = {  # trajectories stay: they check the repetition
     **dict.fromkeys(("key_frames", "observations", "events", "outputs", "learned"), False),
     "decisions": True,
 }
-# The name of an expectation while a run is judged by it; names in scenarios have no spaces.
+# An expectation has this name while a run is judged; names in scenarios have no spaces.
 JUDGED_NAME = "what is judged"
 
 
@@ -72,16 +72,16 @@ class Reproduction:
 
     @property
     def same(self) -> bool:
-        """Whether all that was compared is unchanged and the same in both runs."""
+        """Whether everything compared is unchanged and the same in both runs."""
         return self.stored == self.digest and not self.differing
 
 
 def reproduce(directory: str | Path, *, trust: bool = False) -> Reproduction:
-    """Repeat a stored run from its manifest, and compare all that both stored.
+    """Repeat a stored run from its manifest, and compare the stored results of both.
 
     Args:
         directory: The run directory.
-        trust: Whether its own code and programs may run, if it has some.
+        trust: Whether code and programs of the run may run.
 
     Raises:
         RunDirectoryError: There is no such run, it was not completed, or it has code of its own and
@@ -240,7 +240,7 @@ def _refuse_changed_inputs(directory: Path) -> None:
 def _simulation(
     content: Mapping[str, Any], out: Path | None, artifacts: Mapping[str, Any] | None = None
 ) -> Simulation:
-    # Without its speedup and checkpoints, which would only cost time.
+    # Speedup and checkpoints would only cost time.
     stored = content["scenario"]
     if not isinstance(stored.get("simulation"), dict):
         raise RunDirectoryError(f"{FILE_NAME}: scenario.simulation is missing: it can't be run")
@@ -259,7 +259,7 @@ def _simulation(
 
 
 def _short(name: str) -> str:
-    """Return the name of a table without suffix, and of a field of the manifest without file."""
+    """Return the short name of a table, without suffix, or of a field, without the manifest."""
     return name.removesuffix(".parquet").removeprefix(f"{FILE_NAME}: ")
 
 
@@ -314,7 +314,7 @@ def _other_versions(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]
 def resume(directory: str | Path, *, trust: bool = False) -> Run:
     """Continue an unfinished run to its end; its digest is that of an uninterrupted run.
 
-    It continues from its last checkpoint if this user wrote that, else from its first step.
+    The run continues from its last checkpoint if this user wrote it, else from its first step.
 
     Args:
         directory: The run directory.
@@ -346,7 +346,7 @@ def reopen(directory: str | Path, *, trust: bool = False) -> tuple[Simulation, s
         ArtifactError: See `resume`.
     """
     root = Path(directory)
-    Manifest.read(root)  # before anything is written there
+    Manifest.read(root)  # a damaged run must stay as it is
     unfinished = UnfinishedRun(root)
     try:
         refuse_links(root, (FOLDER, LEARNED_NAME))
@@ -398,7 +398,7 @@ def reopened(
         scenario: The scenario of the run.
         store: The store of its directory, not opened.
         unfinished: The journal and checkpoint of the run, locked.
-        checkpoint: Where to continue; None: start from the first step.
+        checkpoint: The checkpoint to continue from; None: start from the first step.
 
     Raises:
         UnusableCheckpointError: The checkpoint can't be read; nothing is written then.
@@ -433,7 +433,7 @@ def changed_inputs(manifest: Manifest) -> list[str]:
     """Return the input files of a run that have changed since.
 
     Raises:
-        RunDirectoryError: One is missing, or is not a file.
+        RunDirectoryError: An input file is missing, or is not a file.
     """
     changed_paths = []
     for record in manifest.inputs:

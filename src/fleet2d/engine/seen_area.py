@@ -26,8 +26,8 @@ from fleet2d.sight.camera import TableContext, stack_lenses
 if TYPE_CHECKING:
     from fleet2d.algorithms.evidence import Patches
 
-# Slots of the cache of poses, which holds half as many. A round through a large home has a few
-# thousand poses, a month of going to people ten thousand.
+# The cache of poses has this many slots for half as many poses. A round through a large home has a
+# few thousand poses, a month of visits to people ten thousand.
 SLOTS = 1 << 15
 # Most steps in one call of the kernel.
 MAX_BATCH_STEPS = 1 << 16
@@ -41,7 +41,7 @@ class SeenArea(Watcher):
 
     Attributes:
         robot: The robot.
-        row: Its row among the bodies.
+        row: The robot's row among the bodies.
         next_step: The first step that is not included.
     """
 
@@ -92,7 +92,7 @@ class SeenArea(Watcher):
             binned=np.zeros(none, np.int64),
             peak=np.zeros(none, np.int64),
         )
-        # Cells in view, summed and at most, from bin _first_bin on.
+        # The sum and the maximum of cells in view, from bin _first_bin on.
         self._bins = np.zeros((0, 2, len(patches.room)), np.int64)
         self._first_bin = 0
         self._cache = empty_pose_cache(SLOTS, len(patches.room))
@@ -109,7 +109,7 @@ class SeenArea(Watcher):
         self._cache.used[0] = 0
 
     def darken(self, cameras: Collection[str]) -> None:
-        """Let these cameras see nothing from the present step on, and all others see normally."""
+        """Let some cameras see nothing from the present step on, and all others see normally."""
         is_dark = [name in cameras for name in self._names]
         if is_dark == self._is_dark:
             return
@@ -143,7 +143,7 @@ class SeenArea(Watcher):
         return ()
 
     def forget(self) -> None:
-        """Forget which cells were seen, and when; what the evidence counts stays."""
+        """Forget which cells were seen, and when; the counts of the evidence stay."""
         self.catch_up()
         self._settle()
         self._record.first[:] = NEVER
@@ -157,7 +157,7 @@ class SeenArea(Watcher):
     def _collect_bins(self, begin: int, bins: I64) -> None:
         """Collect the bins of the steps from `begin` to the present one."""
         first = begin // self._bin_steps - self._first_bin
-        open_bins = self._bins[first:]  # the last bin, if it has earlier steps
+        open_bins = self._bins[first:]  # the last bin may have earlier steps
         if len(open_bins):
             bins[0, 0] += open_bins[0, 0]
             bins[0, 1] = np.maximum(bins[0, 1], open_bins[0, 1])

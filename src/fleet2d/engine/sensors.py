@@ -125,7 +125,7 @@ class Sensors(Watcher):
                 for number, (name, state) in enumerate(self._states.items())
                 for reading in self._read(name, state, view, end)
             ]
-        # By step, then by sensor.
+        # The order is by step, then by sensor.
         readings.sort(key=lambda item: (item[1].step, item[0]))
         self._readings += readings
         return ()
@@ -148,7 +148,7 @@ class Sensors(Watcher):
     def collect(self) -> list[SensorRow]:
         """Return the readings since the last call, by step and sensor.
 
-        The events up to their steps must be known by then: activities are among them.
+        Events up to these steps must be known, since readings have activities.
         """
         rows = self._readings
         self._readings = []
@@ -181,7 +181,7 @@ class Sensors(Watcher):
         return SensorView(first, x, y, present, self.users)
 
     def _activity(self, user: int, step: int) -> str:
-        """Return the activity of a user at a step, if known; that of all users for user -1."""
+        """Return the activity of a user at a step, if known; for user -1, of all users."""
         if user >= self.users:
             return ""
         if user < 0:

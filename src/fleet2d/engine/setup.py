@@ -104,7 +104,7 @@ def set_up(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Stat
 
 
 def _collisions(basis: Basis) -> "list[Clearance | BlockedWays]":
-    """Return what lets bodies wait for each other; nothing if none gives way."""
+    """Return the watchers that let bodies wait for each other; empty if none gives way."""
     gives_way = any(robot.gives_way is not None for robot in basis.scenario.robots.values())
     if not gives_way and basis.scenario.simulation.people_block is None:
         return []
@@ -114,7 +114,7 @@ def _collisions(basis: Basis) -> "list[Clearance | BlockedWays]":
 
 
 def _yielding(basis: Basis) -> "list[Yielding]":
-    """Return what lets robots yield; nothing if bodies are ghosts to each other."""
+    """Return the watcher that lets robots yield; empty if bodies are ghosts to each other."""
     if basis.scenario.simulation.ghosts:
         return []
     from fleet2d.engine.yielding import Yielding  # few runs need it
@@ -132,7 +132,7 @@ def _encounters(basis: Basis) -> "list[Encounters]":
 
 
 def _conversations(basis: Basis, interventions: InterventionQueue) -> "list[Conversations]":
-    """Return the conversations; none if neither robots nor people want anything."""
+    """Return the conversations; empty if neither robots nor people want anything."""
     scenario = basis.scenario
     if not scenario.interactions and all(user.answers is None for user in scenario.users.values()):
         return []
@@ -142,7 +142,7 @@ def _conversations(basis: Basis, interventions: InterventionQueue) -> "list[Conv
 
 
 def _schedule_failures(state: State, scenario: Scenario, clock: Clock, seed: int) -> None:
-    """Schedule what fails by itself: robots, their cameras, sensors."""
+    """Schedule failures of robots, their cameras, and sensors."""
     robots = scenario.robots.values()
     sensors = [item for item in scenario.objects.values() if isinstance(item, Sensor)]
     causes = [
@@ -233,7 +233,7 @@ def _basis(scenario: Scenario, clock: Clock, seed: int, store: RunStore) -> Basi
 
 
 def _home_with_doors(scenario: Scenario) -> Home:
-    """Return the home, with a door in every doorway that the scenario names."""
+    """Return the home, with doors in the doorways that the scenario names."""
     plan = scenario.floorplan.plan()
     doors = []
     door_names = dict[int, str]()
@@ -255,7 +255,7 @@ def _home_with_doors(scenario: Scenario) -> Home:
 
 @contextmanager
 def _locate_errors(scenario: Scenario, path: str) -> Iterator[None]:
-    """Add to errors where in the scenario the key is written."""
+    """Add the place of the key in the scenario to errors."""
     try:
         yield
     except (PlacementError, ScenarioError) as error:

@@ -1,4 +1,4 @@
-"""The errors of sightings that come after the look: components, and the belief about a pose."""
+"""The errors that act on sightings after the look: components, and the error of localization."""
 
 import math
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ def sight_events(
 
     Args:
         rows: The sightings that become known in the steps, (n, columns).
-        memory: The memory at the first step; what it holds of identities becomes that at the end.
+        memory: The memory at the first step; its identities are updated to the end.
         patience: Steps without a sighting after which an identity counts as lost.
         first: The first step.
         end: The step after the last one.
@@ -71,7 +71,7 @@ def sight_events(
 
 PoseColumns = tuple[I64, I64, I64]  # x, y [lattice units] and heading, one element for each look
 
-# The user of a sighting that an error took back, until it would have become known.
+# The user of a sighting that an error removed, until it would have become known.
 RETRACTED = -2
 
 
@@ -79,8 +79,8 @@ class Darkness(PerceptionError):
     """People who aren't noticed because the light of their room is off.
 
     Attributes:
-        unlit: Share that are noticed nevertheless, by the time of day [hours].
-        sun: The sun, if it decides on that share instead.
+        unlit: Share of people noticed nevertheless, by the time of day [hours].
+        sun: The sun, if it sets that share instead.
     """
 
     unlit: Curve
@@ -106,9 +106,9 @@ class CameraErrors(NamedTuple):
 
     Attributes:
         name: The name of the camera.
-        path: Their path in the scenario, "robots.astro.perception.errors".
-        errors: The errors by name, in the order in which they act, that of the names.
-        darkness: What it misses where lights are off; it acts before them.
+        path: The path of the errors in the scenario, "robots.astro.perception.errors".
+        errors: The errors by name; they act in the order of the names.
+        darkness: The misses where lights are off, which act before the errors.
     """
 
     name: str
@@ -118,7 +118,7 @@ class CameraErrors(NamedTuple):
 
 
 class SightingErrors:
-    """Changes the sightings of a body in the span of their look, delayed ones included.
+    """Changes the sightings of a body in the span of their look, including delayed ones.
 
     Errors of perception come first, then the error of the belief about the body's own pose.
 
@@ -151,7 +151,7 @@ class SightingErrors:
     ) -> tuple[I64, bool]:
         """Return the sightings that become known in a span, and whether others were seen.
 
-        If so, `memory` holds of the identities what it held before the span.
+        In that case, the identities in `memory` are those before the span.
 
         Args:
             rows: The sightings as the look returns them, (n, columns).
@@ -190,7 +190,7 @@ class SightingErrors:
         camera = self._cameras[c]
         errors = camera.errors
         if self._owner.home.unlit:
-            errors = {"": camera.darkness} | errors  # no error of a scenario has an empty name
+            errors = {"": camera.darkness} | errors  # errors of a scenario have no empty names
         if errors:
             eye = camera_poses(self._lenses, c, body, looks * self._owner.clock.step_us)
             old = self._sightings(camera.name, rows, looks, eye)
@@ -224,7 +224,7 @@ class SightingErrors:
         return sightings
 
     def _sightings(self, camera: str, rows: I64, looks: I64, eye: PoseColumns) -> CameraSightings:
-        """Return the sightings of some looks of a camera, which is at a place in each."""
+        """Return the sightings of some looks of a camera, given its pose in each."""
         owner = self._owner
         lattice = owner.home.lattice
         seen = lattice.to_metres(rows[:, [Column.X, Column.Y]])

@@ -1,6 +1,6 @@
 """The simulation: a run in progress, which can be stepped, changed, read and copied.
 
-It has the state of the run, and a loop that takes the state from span to span.
+A simulation has the state of the run, and a loop that takes the state from span to span.
 """
 
 import copy
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from fleet2d.expectations.expectation import Expectation
     from fleet2d.expectations.verdict import Verdict
 
-# What the signature of a file is for.
+# The purpose of the signature of a file.
 PURPOSE = "saved simulation"
 
 
@@ -71,7 +71,7 @@ class Simulation:
     Attributes:
         scenario: The scenario.
         seed: The seed of the scenario, or the one that was drawn.
-        clock: Its steps.
+        clock: The steps of the run.
 
     Example:
         >>> import copy
@@ -117,7 +117,7 @@ class Simulation:
     def _prepare(
         self, scenario: Scenario, store: RunStore, interventions: Sequence[Mapping[str, Any]] = ()
     ) -> None:
-        """Set up all but the directory."""
+        """Set up everything but the directory."""
         self.scenario = scenario
         simulation = scenario.simulation
         self.seed = secrets.randbelow(2**53) if simulation.seed is None else simulation.seed
@@ -127,14 +127,14 @@ class Simulation:
         # The scenario's own script repeats its interventions itself.
         outside = [dict(record) for record in interventions if is_from_outside(record)]
         self._repeat(outside)
-        self._run: Run | None = None  # set when it is finished
+        self._run: Run | None = None  # set at the end
         self._keeper = self._open_keeper()
         self._loop = Loop(self.clock, simulation.speedup, self._keeper)
         self._setup_s = 0.0
         self._describe_start(outside)
 
     def _open_keeper(self) -> "CheckpointWriter | None":
-        """Return what commits rows and writes checkpoints; None: the run is in memory."""
+        """Return the writer of commits and checkpoints; None: the run is in memory."""
         if self._store.directory is None:
             return None
         from fleet2d.engine.checkpoint import CheckpointWriter
@@ -143,7 +143,7 @@ class Simulation:
         return CheckpointWriter(self._store, settings, self.clock, self._checkpoint_header)
 
     def _repeat(self, records: Sequence[Mapping[str, Any]]) -> None:
-        """Apply interventions from outside that were recorded."""
+        """Apply recorded interventions from outside."""
         if records:
             from fleet2d.engine.world import repeat  # few runs need it
 
@@ -190,7 +190,7 @@ class Simulation:
 
     @property
     def notes(self) -> list[str]:
-        """Oddities of the floor plan and its flaws, and remarks on what the scenario names."""
+        """Oddities and flaws of the floor plan, and remarks on parts of the scenario."""
         sources = (f"{c.owner.path}: {note}" for c in self._state.cameras for note in c.notes)
         bodies = (f"{body.path}.{note}" for body in self._state.actors for note in body.notes)
         wrong = (f"wrong: {text}" for text in flaws_of(self))
@@ -233,9 +233,7 @@ class Simulation:
     def state(self) -> dict[str, dict[str, Any]]:
         """The state at the next step by name, of bodies: x, y [m], heading [rad], room, away, off.
 
-        `off` is why a robot is off, if it is.
-
-        Of doors it is whether they are open and locked, of sensors whether they are on.
+        `off` is the reason for which a robot is off. Doors have `open` and `locked`, sensors `on`.
         """
         bodies = {actor.name: self._state_of(actor) for actor in self._state.actors}
         doors = {
@@ -285,11 +283,11 @@ class Simulation:
         table, and readings of sensors, with the event `sensor` and the state as detail.
 
         Args:
-            function: Called with one or more events of one step, or of a few.
-            kinds: The kinds of events that it gets; None: all.
+            function: Called with the events of one or a few steps.
+            kinds: The kinds of events that the function gets; None: all.
 
         Raises:
-            InputError: There is no such kind of event.
+            InputError: A kind of event doesn't exist.
 
         Example:
             >>> import fleet2d
@@ -305,14 +303,15 @@ class Simulation:
         names = known if kinds is None else frozenset(kinds)
         for name in names:
             check_known(name, "event", sorted(known), InputError)
-        state.settle(self.step)  # what happened before it listened
+        state.settle(self.step)  # earlier events are not for this function
         state.events.listeners.append(Listener(function, names))
         state.wait_for(state.requested)
 
     def listen_rows(self, function: Callable[[str, Mapping[str, Any]], None]) -> None:
         """Call a function with each row of a table as soon as it is known.
 
-        Events come to `listen`. From then on rows are stored after every span, which takes longer.
+        For events, see `listen`. From this call on, rows are stored after every span, which takes
+        longer.
 
         Args:
             function: Called with the name of the table, and the row as a mapping of its columns.
@@ -474,7 +473,8 @@ class Simulation:
     def _run_until_expectation(self, expectation: "Expectation", end: int) -> "Verdict":
         """Simulate until a condition holds, or an expectation is decided.
 
-        A copy goes ahead, so that the run itself stops at that step and knows nothing of it.
+        A copy goes ahead to find the step, so that the run itself stops there without knowing of
+        it.
         """
         from fleet2d.expectations.temporal import eventually
 
@@ -802,7 +802,7 @@ class Simulation:
     def _take(self, state: State) -> None:
         self._state = state
         self._store = state.store
-        state.wait_for(state.requested)  # not for events that only listeners of another run await
+        state.wait_for(state.requested)  # listeners of another run await other events
 
     def _header(self) -> dict[str, Any]:
         wall_s = self._wall_s
@@ -847,7 +847,7 @@ class Simulation:
         with suppress(Exception) if status == "failed" else nullcontext():
             state.settle(self.step)
             state.events.deliver(self.step)
-        # After a failure the metrics are not computed: they could fail, too, and lose the tables.
+        # After a failure, metrics are not computed: they could fail, too, and lose the tables.
         results = {} if status == "failed" else self._measure(ended=status == "complete")
         self._loop.simulate_s += time.perf_counter() - began
         began = time.perf_counter()
@@ -898,7 +898,7 @@ class Simulation:
         return [f"{where}: {text}" for where, text in odd if text]
 
     def _describe_end(self, results: Mapping[str, Any]) -> None:
-        """Set the fields that are known after the last step; tables and digest are set already."""
+        """Set the fields known after the last step; tables and digest are already set."""
         manifest = self._store.manifest
         queue = self._state.interventions
         pace = self._loop.pace

@@ -46,8 +46,8 @@ from fleet2d.storage.secret_files import SIGNATURE_CHARACTERS, signature
 _SCALARS = set(np.sctypeDict.values()) - {np.void, np.object_}
 _DTYPES = {type(np.dtype(scalar)) for scalar in _SCALARS}
 
-# Types of objects that never change: copies in one process share them. Some by name, as few runs
-# need their modules.
+# Copies in one process share objects of these types, which never change. Some are given by name, as
+# few runs need their modules.
 _SHARED = frozenset(
     {
         *(Column, ColumnChunk, CostedSpace, Event, FloorPlan, FunctionType, KeySegment, Mesh, Note),
@@ -70,14 +70,14 @@ _SHARED_NAMES = frozenset(
 )
 
 MAGIC = b"fleet2d simulation"
-# Size of the parts of a file [bytes]: as few as possible, and little memory.
+# The size of the parts of a file: few parts, and little memory [bytes].
 _PART_BYTES = 1 << 22
 
 Constants = Mapping[str, object]
 
 
 class UnstorableStateError(ArtifactError):
-    """A component of the user holds something that can't be written to a file."""
+    """A user's component holds something that can't be written to a file."""
 
 
 def copy_state(state: State, constants: Constants) -> State:
@@ -186,7 +186,7 @@ class _SnapshotParts:
         self.error: OSError | None = None
 
     def write(self, content: bytes) -> None:
-        """Add content, and write it when there is enough."""
+        """Add content, and write whole parts."""
         self._buffer += content
         if len(self._buffer) >= _PART_BYTES:
             self._seal.update(self._buffer)
@@ -211,11 +211,10 @@ class _SnapshotParts:
 def open_snapshot(path: str | Path | BinaryIO, purpose: str) -> tuple[dict[str, Any], BinaryIO]:
     """Return the header of a snapshot, and the state after it for `read_state`.
 
-    Nothing is interpreted before the signature has been checked, of the very bytes that are read
-    then.
+    The signature of the very bytes that are read is checked before anything is interpreted.
 
     Raises:
-        ArtifactError: It is not a snapshot by this user, is damaged, or is of another version of
+        ArtifactError: The file is no snapshot by this user, is damaged, or is of another version of
             Fleet2D.
     """
     with os_errors_as(ArtifactError, f"{path} can't be read"):
@@ -251,7 +250,7 @@ def _is_shared(kind: Any) -> bool:
 
 
 def shared_object(number: int) -> object:
-    """Stand for a shared object in a copy, whose reader replaces this function by its own."""
+    """Stand for a shared object in a copy; the reader replaces this function by its own."""
     raise NotImplementedError
 
 
@@ -322,7 +321,7 @@ class _StateReader(pickle.Unpickler):
         return self._constants[pid]
 
     def find_class(self, module: str, name: str) -> Any:
-        if not is_scenario_module(module):  # this process may know it by another name
+        if not is_scenario_module(module):  # this process may know the module by another name
             top, dot, rest = public_name(module).partition(".")
             module = self._packages.get(top, top) + dot + rest
         return super().find_class(module, name)
@@ -331,7 +330,7 @@ class _StateReader(pickle.Unpickler):
 def _own_packages(scenario: Any) -> dict[str, str]:
     """Return the packages of a scenario's own components in this process by their public names.
 
-    They may be installed in one process, and come from the folder of the scenario in another.
+    A package may be installed in one process, and come from the scenario's folder in another.
     """
     packages = {}
     for module in {type(component).__module__ for component in components_of(scenario)}:

@@ -1,4 +1,4 @@
-"""The state of a run: all that changes from step to step, and the stream of its events."""
+"""The state of a run, which changes from step to step, and the stream of its events."""
 
 from array import array
 from collections import defaultdict, deque
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 W = TypeVar("W", bound=Watcher)
 
-# The maximum number of steps that watchers process together: fewer if there are many bodies.
+# Watchers process at most this many steps together, or fewer with many bodies.
 MAX_STEPS = 1 << 16
 MIN_STEPS = 1 << 12
 MAX_POSES = 1 << 21
@@ -66,7 +66,7 @@ class RecentEvents(deque[Event]):
     """The newest events of a run."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Write the steps and texts as numbers, and the texts: a checkpoint has many events."""
+        """Encode texts as numbers, since a checkpoint has many events."""
         index: defaultdict[str, int] = defaultdict()
         index.default_factory = index.__len__
         steps, *texts = list(zip(*self, strict=True)) or [()]
@@ -86,8 +86,8 @@ class RecentEvents(deque[Event]):
 class EventStream:
     """The events of a run, passed on to all sinks.
 
-    Sinks receive events as they become known, listeners all events of a stretch of steps in order,
-    also readings of sensors, which have a table of their own.
+    Sinks receive events as they become known. Listeners receive all events of a stretch of steps in
+    order, including readings of sensors, which have a table of their own.
 
     Attributes:
         sinks: The receivers.
@@ -109,13 +109,13 @@ class EventStream:
         self.listeners: list[Listener] = []
         self.awaited: Set[str] = frozenset()
         self._row = {name: row for row, name in enumerate([HOME, *entities])}
-        self._unheard: list[Event] = []  # by the listeners
-        self._awaited_steps: list[int] = []  # of awaited events since the last span began
+        self._unheard: list[Event] = []  # events that listeners haven't received
+        self._awaited_steps: list[int] = []  # steps of awaited events since the last span began
         self._recent = RecentEvents(maxlen=self.CAPACITY)
         self._first_step = 0  # all events from this step on are in `_recent`
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out the functions: they belong to the caller, not to the run."""
+        """Leave out the functions, which belong to the caller, not to the run."""
         return {**self.__dict__, "listeners": [], "_unheard": []}
 
     def emit(self, events: Sequence[Event]) -> None:
@@ -184,12 +184,12 @@ class State(Cast):
         home: The present home: doors, furniture, rooms, layers.
         changes: The changes of the home.
         watchers: All followers of the bodies that the run needs, in their order.
-        steering: Those of them that may replace plans at any step.
-        yielding: The one by which robots keep clear of others; None if none does.
+        steering: The watchers that may replace plans at any step.
+        yielding: The watcher by which robots keep clear of others; None if none does.
         user_cameras: The cameras of users.
         cameras: The cameras of robots.
-        layers: What robots have seen of the home, and when layers are stored.
-        learners: Algorithms and metrics, what they have learned, and their outputs.
+        layers: The layers of the home, such as the seen cells, and the times of storing them.
+        learners: Algorithms and metrics, with their learned states and outputs.
         log: The data that learners may read; None if there are no learners.
         recorder: Rows that aren't stored yet.
         store: The tables of the run.
@@ -200,8 +200,8 @@ class State(Cast):
         interventions: The interventions, done and scheduled.
         driven: Rows of the bodies that are driven from outside.
         requested: Event kinds that end a span because a caller waits for them.
-        awaited: Event kinds that end a span: `requested`, and those that interventions and
-            listeners wait for.
+        awaited: Event kinds that end a span: `requested`, and those awaited by interventions and
+            listeners.
         expectations: The watcher of the run's expectations; None if there are none.
         notes_emitted: Number of notes of each body's present plan that have happened.
         capacity: The maximum number of steps that watchers process together.
@@ -231,7 +231,7 @@ class State(Cast):
     notes_emitted: list[int] = field(init=False)
     capacity: int = field(init=False)
     yielding: "Yielding | None" = None
-    _situation: Situation | None = None  # the newest one
+    _situation: Situation | None = None  # the newest situation
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out the situation, which follows from the rest."""
@@ -251,7 +251,7 @@ class State(Cast):
     # Decisions of scripts
 
     def wait_for(self, kinds: frozenset[str]) -> None:
-        """Let spans end at events of these kinds, besides those that components wait for."""
+        """Let spans end at events of some kinds, besides those that components wait for."""
         listened = frozenset[str]().union(*(kinds for _, kinds in self.events.listeners))
         self.requested = kinds
         self.awaited = kinds | self.interventions.kinds | listened
@@ -262,7 +262,7 @@ class State(Cast):
 
     def expect(self, scenario: Scenario, name: str, expectation: "Expectation", since: int) -> None:
         """Add an expectation that is judged from a step on; see `RunExpectations.add`."""
-        # They import much that other runs don't need.
+        # Expectations import much that other runs don't need.
         from fleet2d.engine.expectations import RunExpectations
         from fleet2d.expectations.signals import MeasuredRun
 
@@ -437,7 +437,7 @@ class InView:
     cameras: Cameras
 
     def __call__(self) -> dict[str, tuple[float, float]]:
-        """Return the last perceived place of each [m], by name; "" for somebody unknown."""
+        """Return the last perceived place of each body [m], by name; "" for somebody unknown."""
         self.state.take(self.cameras, self.state.bodies.step)
         return self.cameras.in_view
 

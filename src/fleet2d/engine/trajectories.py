@@ -1,6 +1,6 @@
 """The tables of poses: samples at regular times, and key frames.
 
-From key frames, which are few, all poses of a run can be rebuilt.
+Key frames are few, and all poses of a run can be rebuilt from them.
 """
 
 from typing import Any, NamedTuple
@@ -150,8 +150,8 @@ class KeyFrames:
         self._home = basis.home
         self._actors = basis.actors
         self._bodies = basis.bodies
-        # A random walk is rebuilt by repeating it between the same walls; where these may change,
-        # each of its steps is a key frame.
+        # A random walk is rebuilt by repeating it between the same walls; if these may change, each
+        # step is a key frame.
         self._walk_kind = WALK
         self._walk_every = max(1, WALK_KEY_US // basis.clock.step_us)
         if basis.may_change:
@@ -160,17 +160,17 @@ class KeyFrames:
         # Collected breakpoints of the present plan; the plan before the first has none.
         count = len(basis.actors)
         self._emitted = [2] * count
-        self._complete_until = [-1] * count  # the end of the last plan, if it was reached
+        self._complete_until = [-1] * count  # end of the last plan, if reached
         self._walkers: set[int] = set()  # bodies whose present plan is a random walk
-        self._walked = [1] * count  # the step before which it is collected
+        self._walked = [1] * count  # step before which a walk is collected
         self._moved: set[int] = set()  # bodies that were put elsewhere since their last plan
         self._segments: ImmutableRows[KeySegment] = ImmutableRows()
         self._rows = 0
-        self._end = 0  # key frames before this step are collected when they are stored
+        self._end = 0  # key frames before this step are collected on storing
 
     @property
     def count(self) -> int:
-        """Number of rows that are not stored yet, about; many small segments take more memory."""
+        """Approximate number of rows not stored yet; many small segments take more memory."""
         return self._rows + 8 * len(self._segments)
 
     def end_plan(self, row: int, step: int) -> None:
@@ -201,9 +201,9 @@ class KeyFrames:
             self._segments.append(_key(row, self._walk_kind, moment, actor.state))
 
     def move_body(self, row: int, step: int) -> None:
-        """Begin the next plan of a body with a key frame, as it doesn't continue the last one.
+        """Begin the next plan of a body with a key frame, since it doesn't continue the last one.
 
-        A random walk ends with a key frame of its own, where the body was before it is moved.
+        A random walk ends with a key frame of its own, where the body was before the move.
         """
         self._moved.add(row)
         actor = self._actors[row]
@@ -234,7 +234,7 @@ class KeyFrames:
             self._segments.append(end)
 
     def take(self, end: int) -> None:
-        """Collect random walks up to step `end` - 1; `collect` the other key frames later.
+        """Collect random walks up to step `end` - 1; `collect` takes the other key frames.
 
         The poses of a random walk are forgotten afterwards, the breakpoints of a plan are not.
         """

@@ -1,4 +1,4 @@
-"""Scripts in a run: the run that interventions read and change, and when they are applied.
+"""Scripts in a run: the world that interventions read and change, and the times of applying them.
 
 Entries of a scenario's script and requests from outside are checked, then scheduled at their time
 or until their event.
@@ -73,7 +73,7 @@ class EngineWorld:
 
     @property
     def lasting(self) -> Sequence[object]:
-        """The active interventions with a duration, in the order of their begin."""
+        """The active interventions with a duration, in order of beginning."""
         return self._state.interventions.lasting
 
     def undo(self, applies: Callable[[object], bool]) -> None:
@@ -144,7 +144,7 @@ class EngineWorld:
         return power.switch_on(self._state, actor, self.step)
 
     def drive(self, actor: DecidingActor) -> None:
-        """Let a body follow only plans from outside from now on, not its behaviors."""
+        """Let a body follow plans from outside from now on, instead of its behaviors."""
         actor.behaviors = []
         actor.arbiter = Arbiter([])
         actor.order = None
@@ -173,7 +173,7 @@ class EngineWorld:
 
 
 def request(state: State, act: Mapping[str, Any] | Intervention, step: int) -> bool:
-    """Schedule an intervention from outside: at a step, or when its entry in a script says.
+    """Schedule an intervention from outside, at a step or as its entry in a script says.
 
     Args:
         state: The run.
@@ -181,7 +181,7 @@ def request(state: State, act: Mapping[str, Any] | Intervention, step: int) -> b
         step: The present step.
 
     Returns:
-        Whether it is for a later time or an event.
+        Whether the intervention waits for a later time or an event.
 
     Raises:
         ScenarioError: It is not valid, names something unknown, or can never happen.
@@ -216,7 +216,7 @@ def schedule_script(state: State, entry: Entry, index: int) -> None:
     Args:
         state: The run.
         entry: The entry.
-        index: Its place in the script.
+        index: The place of the entry in the script.
 
     Raises:
         ScenarioError: It names something unknown, its event can never happen, or its time isn't
@@ -264,7 +264,7 @@ def steps_of(entry: Entry, clock: Clock, first: int) -> list[int]:
     """Return the steps at which an entry is applied: from `first` on, within the run.
 
     Raises:
-        ScenarioError: There are none.
+        ScenarioError: There are no such steps.
     """
     time = entry.at
     if isinstance(time, ClockTime):
@@ -294,7 +294,7 @@ def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
     """Refuse an event that can never happen.
 
     Raises:
-        ScenarioError: It can't happen; the message lists the events that can.
+        ScenarioError: The event can't happen; the message lists the events that can.
     """
     users = world.users.values()
     robots = world.robots.values()
@@ -318,7 +318,7 @@ def check_trigger(world: EngineWorld, trigger: Trigger) -> None:
             f"{trigger.event!r} can never happen {place}{suggest(trigger.event, kinds, 'What can')}"
         )
     details = possible_details(users, robots, world.acts)
-    own = f"{trigger.event} {trigger.entity}"  # such as the activities of one user
+    own = f"{trigger.event} {trigger.entity}"  # like a user's activities
     known = details.get(own if own in details else trigger.event)
     # An empty detail is somebody who isn't recognized.
     if known is None or not trigger.detail or trigger.detail.startswith("come "):

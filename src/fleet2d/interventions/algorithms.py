@@ -1,4 +1,4 @@
-"""Interventions on algorithms: what they have learned, and what others read of them."""
+"""Interventions on algorithms: their learned states, and the outputs that others read."""
 
 from typing import Any
 
@@ -38,7 +38,7 @@ class ResetAlgorithm(Intervention):
         """Restart the algorithm.
 
         Raises:
-            InputError: It can't use the file, such as one that was learned in another home.
+            InputError: The algorithm can't use the file, for example one from another home.
         """
         with errors_as(InputError, f"learned: {self.learned}", of=ComponentError):
             world.reset(self.algorithm, self.learned)
@@ -53,7 +53,7 @@ class ReplaceOutput(Lasting):
         algorithm: The algorithm.
         rooms: Weights of rooms; 0 for those left out.
         values: Numbers and texts by name, for an output that is a mapping.
-        frozen: Whether its output at that step remains.
+        frozen: Whether the output at that step remains.
         withheld: Whether there is no output, as before the first one.
 
     Example:

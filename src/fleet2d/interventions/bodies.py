@@ -1,4 +1,4 @@
-"""Interventions on people and robots: where they are, where they go, and what people do."""
+"""Interventions on people and robots: their positions, destinations and activities."""
 
 from datetime import timedelta
 from typing import Annotated, Any
@@ -49,7 +49,8 @@ class BodyIntervention(Intervention):
         While doors are shut only the name of the place is checked: they may open later.
 
         Raises:
-            PlacementError: The message lists the places that there are.
+            PlacementError: There is no such place, and the message lists the others, or no way to
+                it.
         """
         actor = self.actor(world)
         home = actor.home
@@ -66,7 +67,7 @@ class BodyIntervention(Intervention):
 
 
 class Put(BodyIntervention):
-    """Put a body at a place at once, as if it were carried; it replans there.
+    """Put a body at a place at once, as if it were carried, where it replans.
 
     A robot is not told that it was moved; it can notice only by its position. In a room the point
     is drawn at random; at furniture it is the point from which the furniture is used.
@@ -145,7 +146,7 @@ class HoldStill(BodyIntervention):
 
     Attributes:
         duration: How long it stays still; left out: until it is released.
-        posture: How a person is there, such as lie after a fall; left out: as before.
+        posture: The posture of a person, such as lie after a fall; left out: as before.
 
     Example:
         >>> HoldStill("ana", posture="lie").posture
@@ -175,7 +176,7 @@ class Release(BodyIntervention):
     """
 
     def begin(self, world: World) -> None:
-        """Cancel its order."""
+        """Cancel the order of the body."""
         self.actor(world).follow_order(None, world.step)
 
 
@@ -188,14 +189,14 @@ class Replan(BodyIntervention):
     """
 
     def begin(self, world: World) -> None:
-        """Let its behaviors decide at the present step."""
+        """Let the behaviors of the body decide at the present step."""
         self.actor(world).decide_again(world.step)
 
 
 class Configure(BodyIntervention):
-    """Change keys of a behavior of a body: it starts anew with them, and the body replans.
+    """Change keys of a body's behavior, which starts anew with them; the body replans.
 
-    What else the behavior was doing, or remembered, is lost.
+    All other state of the behavior is lost.
 
     Attributes:
         behavior: The behavior, by its type.
@@ -243,7 +244,7 @@ class TakeControl(BodyIntervention):
     """
 
     def begin(self, world: World) -> None:
-        """Let it follow given plans; without a plan it stays where it is."""
+        """Let the body follow given plans; without a plan it stays where it is."""
         world.drive(self.actor(world))
 
 
@@ -274,7 +275,7 @@ class Decide(BodyIntervention):
         The body may have been put elsewhere at the same step, after the plan was made.
 
         Raises:
-            ScenarioError: The body isn't driven: its behaviors would decide at once.
+            ScenarioError: The body isn't driven, so its behaviors would decide at once.
         """
         actor = self.actor(world)
         if actor.behaviors:
@@ -297,7 +298,7 @@ def behavior_number(actor: Actor, name: str) -> int:
     """Return the number of a behavior of a body by its type.
 
     Raises:
-        ScenarioError: It has no such behavior.
+        ScenarioError: The body has no such behavior.
     """
     names = [behavior.type_name for behavior in actor.behaviors]
     if name not in names:

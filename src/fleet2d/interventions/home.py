@@ -1,4 +1,4 @@
-"""Interventions on the home: its doors, furniture, rooms and sensors; and the end of others."""
+"""Interventions on the home, its doors, furniture, rooms and sensors, and one that ends others."""
 
 from typing import Literal
 
@@ -83,8 +83,8 @@ class MoveFurniture(HomeIntervention):
 
     Attributes:
         object: The piece of furniture.
-        to: Where its centre is then, [x, y] in metres.
-        turn_deg: How far it is turned, counter-clockwise.
+        to: The new position of its centre, [x, y] in metres.
+        turn_deg: Angle by which it is turned, counter-clockwise.
 
     Example:
         >>> MoveFurniture("sofa_1", (2, 1), turn_deg=90).to
@@ -119,7 +119,7 @@ class SwitchLights(HomeIntervention):
 
     Attributes:
         room: The room, a kind of rooms, or `all`.
-        turn: How it is switched.
+        turn: The new state of the light.
 
     Example:
         >>> SwitchLights("kitchen", "off").turn
@@ -132,12 +132,13 @@ class SwitchLights(HomeIntervention):
 
 
 class SlowFloor(SlowArea, Lasting):
-    """Let a wet floor or a carpet slow robots down, or its edge stop them; they don't know of it.
+    """Let a wet floor or a carpet slow robots down, or its edge stop them, unknown to them.
 
     Attributes:
-        area: Its corners [m].
-        speed: Their speed in it, as a share of the usual one; turning on the spot is as ever.
-        stop: How long they stop when they enter it.
+        area: The corners of the area [m].
+        speed: Speed of robots in the area, as a share of the usual one; turning on the spot is as
+            ever.
+        stop: Time for which robots stop when they enter it.
 
     Example:
         >>> SlowFloor([(2, 2), (4, 2), (4, 3)], speed="20 %").speed
@@ -175,7 +176,7 @@ class ReportState(SensorIntervention):
 
     Attributes:
         sensor: The sensor.
-        says: Whether it is on or off from now on.
+        says: The state of the sensor from now on.
 
     Example:
         >>> ReportState("front_door", "on").says
@@ -194,7 +195,7 @@ class ReportState(SensorIntervention):
             )
 
     def begin(self, world: World) -> None:
-        """Set its state."""
+        """Set the state of the sensor."""
         world.stick(self.sensor, self.says)
 
 
@@ -241,5 +242,5 @@ class Restore(Intervention):
             )
 
     def begin(self, world: World) -> None:
-        """End them."""
+        """End these interventions."""
         world.undo(lambda act: isinstance(act, Lasting) and getattr(act, act.subject) == self.name)

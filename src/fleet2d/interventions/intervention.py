@@ -1,4 +1,4 @@
-"""Interventions as data: how they are written, as {put: ana, to: kitchen}, and when they happen."""
+"""Interventions as data, written as {put: ana, to: kitchen}, and the times of their entries."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
@@ -78,7 +78,7 @@ class World(Protocol):
 
     @property
     def lasting(self) -> Sequence[object]:
-        """The active interventions with a duration, in the order of their begin."""
+        """The active interventions with a duration, in order of beginning."""
 
     def undo(self, applies: Callable[[object], bool]) -> None:
         """End the active interventions to which a condition applies."""
@@ -114,7 +114,7 @@ class World(Protocol):
         """Let a robot begin anew at the present step; return whether it was carried elsewhere."""
 
     def drive(self, actor: DecidingActor) -> None:
-        """Let a body follow only plans from outside from now on, not its behaviors."""
+        """Let a body follow plans from outside from now on, instead of its behaviors."""
 
     def check_change(self, change: HomeChange) -> None:
         """Refuse an impossible change of the home.
@@ -136,9 +136,9 @@ class World(Protocol):
 class Intervention(Component):
     """A change of a run from outside: by a script, a test or a person.
 
-    It is data: the same in a scenario's `script`, in `Simulation.do` and in a manifest.
-    Interventions are the first phase of a step, so their effects hold for all of it. The random
-    draws of all other bodies stay the same.
+    An intervention is data: the same in a scenario's `script`, in `Simulation.do` and in a
+    manifest. Interventions are the first phase of a step, so their effects hold for all of it. The
+    random draws of all other bodies stay the same.
     """
 
     kind = "intervention"
@@ -146,11 +146,11 @@ class Intervention(Component):
     subject: ClassVar[str] = "entity"
 
     def __init__(self, *values: Any, **keys: Any) -> None:
-        """Describe it: ``Put("ana", "kitchen")``.
+        """Describe an intervention: ``Put("ana", "kitchen")``.
 
         Args:
-            values: Its subject, and its other required fields in their order.
-            keys: All others.
+            values: The subject, then the other required fields in order.
+            keys: All other fields.
 
         Raises:
             ScenarioError: A key is unknown, missing or given twice, or a value is wrong.
@@ -165,12 +165,12 @@ class Intervention(Component):
         with validating(f"{cls.__name__}()"):
             super().__init__(**given, **keys)
 
-    # Pydantic passes no context through a constructor of its own that is not marked like this.
+    # Without this mark, pydantic passes no context through a custom constructor.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @classmethod
     def needed(cls) -> list[str]:
-        """Return the fields without default, the subject first."""
+        """Return the required fields, the subject first."""
         names = [name for name, field in cls.model_fields.items() if field.is_required()]
         return sorted(names, key=lambda name: name != cls.subject)
 
@@ -183,20 +183,20 @@ class Intervention(Component):
         """
 
     def begin(self, world: World) -> None:
-        """Apply it at the present step."""
+        """Apply the intervention at the present step."""
         raise NotImplementedError
 
     def end(self, world: World) -> None:
-        """Undo it when its time is over."""
+        """Undo the intervention when its time is over."""
 
 
 class Lasting(Intervention):
     """Base of interventions with a duration; `begin` and `end` apply all that are active then.
 
-    By default, the end is a beginning of those that remain.
+    By default, `end` calls `begin` of those that remain.
 
     Attributes:
-        duration: How long it lasts; left out: until it is undone by `restore`.
+        duration: Its duration; left out: until it is undone by `restore`.
     """
 
     duration: PositiveDuration | None = None
@@ -248,7 +248,7 @@ def _actor_of(name: str, noun: str, actors: Mapping[str, DecidingActor]) -> Deci
 class Verb(Codec):
     """Declares a field for an intervention, written by its verb: ``{put: ana, to: kitchen}``.
 
-    The long form, ``{do: put, entity: ana, to: kitchen}``, is what it is dumped to.
+    It is dumped to the long form, ``{do: put, entity: ana, to: kitchen}``.
     """
 
     def validate(self, value: Any, info: ValidationInfo) -> Intervention:
@@ -427,7 +427,7 @@ class Trigger(Settings):
     detail: str | None = None
 
     def fits(self, event: Event) -> bool:
-        """Whether an event triggers the intervention."""
+        """Return whether an event triggers the intervention."""
         return (
             event.event == self.event
             and self.entity in (None, event.entity)
@@ -489,8 +489,8 @@ ENTRY_KEYS = frozenset({"at", "on", "each", "delay"})
 class Entry(Settings):
     """An intervention at a time or on an event: ``{at: "19:00", put: ana, to: kitchen}``.
 
-    It happens at the first step that isn't before its time; or at the step after its event, or
-    later by a delay.
+    The intervention happens at the first step that isn't before its time, or at the step after its
+    event, or later by a delay.
 
     Attributes:
         at: The time.
@@ -532,7 +532,7 @@ class Entry(Settings):
         return line
 
     def model_post_init(self, _: object, /) -> None:
-        """Require one time or event, and keys that go with it."""
+        """Require either a time or an event, and keys that fit it."""
         if (self.at is None) == (self.on is None):
             raise problem("give exactly one of 'at' (a time) and 'on' (an event)")
         if self.on is None and self.delay:
@@ -562,7 +562,7 @@ def parse_entry(content: Mapping[str, Any]) -> Entry:
 
 
 def causes_errors(act: Intervention, robot: str) -> bool:
-    """Whether an intervention lets a robot perceive something wrong."""
+    """Return whether an intervention makes a robot's perceptions wrong."""
     disturbance = getattr(act, "disturbance", None)
     if disturbance is None or getattr(act, "entity", None) != robot:
         return False

@@ -1,4 +1,4 @@
-"""Interventions on robots: calls, batteries, faults, and what they perceive."""
+"""Interventions on robots: calls, batteries, faults, and perceptions."""
 
 from datetime import timedelta
 from typing import TypeGuard
@@ -24,9 +24,9 @@ from fleet2d.sight.camera import Disturbance, FalseSighting, dark_cameras
 from fleet2d.sight.perception import Perception
 
 UNKNOWN = "unknown"
-# Coordinates beyond this are not in a home [m].
+# No home has coordinates beyond this [m].
 MAX_PLACE_M = 1e4
-# Commands to which the behavior of the same name responds.
+# The behavior of the same name responds to each of these commands.
 RESPONDERS = ("come", "find", "dock")
 
 
@@ -72,7 +72,7 @@ class Call(RobotIntervention):
 
     @property
     def order(self) -> Command:
-        """The command that its behaviors receive."""
+        """The command that the robot's behaviors receive."""
         if self.to is not None:
             return Command("come", place=self.to)
         if self.find is not None:
@@ -80,7 +80,7 @@ class Call(RobotIntervention):
         return Command(self.command or "dock")
 
     def check(self, world: World) -> None:
-        """Refuse a call that none of its behaviors responds to."""
+        """Refuse a call to which no behavior of the robot responds."""
         actor = self.actor(world)
         command = self.order
         if self.to is not None:
@@ -93,7 +93,7 @@ class Call(RobotIntervention):
             )
 
     def begin(self, world: World) -> None:
-        """Pass the command to its behaviors."""
+        """Pass the command to the robot's behaviors."""
         command = self.order
         if self.actor(world).is_off:
             return
@@ -102,7 +102,7 @@ class Call(RobotIntervention):
 
 
 class Dismiss(RobotIntervention):
-    """Send a robot away: it drops what it was called to do, whom it follows, and its search.
+    """Send a robot away: it gives up calls, following and searching.
 
     Example:
         >>> Dismiss("astro").entity
@@ -110,12 +110,12 @@ class Dismiss(RobotIntervention):
     """
 
     def begin(self, world: World) -> None:
-        """Make it replan without that."""
+        """Make the robot replan without these tasks."""
         self.actor(world).dismiss(world.step)
 
 
 class KeepOut(RobotIntervention, Lasting):
-    """Tell a robot to keep out of rooms: it leaves them, and goes round them until it may again.
+    """Ban a robot from rooms: it leaves them, and goes round them until the ban ends.
 
     Events: `banned` and `allowed`, with the room.
 
@@ -129,7 +129,7 @@ class KeepOut(RobotIntervention, Lasting):
     """
 
     of: tuple[str, ...] | str
-    # The rooms when it began: their kinds may change until it ends.
+    # The rooms are kept from the beginning, since their kinds may change until the end.
     _banned_rooms: tuple[int, ...] = ()
 
     def check(self, world: World) -> None:
@@ -138,7 +138,7 @@ class KeepOut(RobotIntervention, Lasting):
         self._rooms(world)
 
     def begin(self, world: World) -> None:
-        """Tell it, and let it leave."""
+        """Ban the robot from the rooms, and let it leave them."""
         rooms = self._rooms(world)
         self._banned_rooms = tuple(room.index for room in rooms)
         for room in rooms:
@@ -146,7 +146,7 @@ class KeepOut(RobotIntervention, Lasting):
             self.actor(world).keep_out(room.index, world.step, NEVER, room.name)
 
     def end(self, world: World) -> None:
-        """Let it in again, unless another one of these interventions doesn't."""
+        """Let the robot in again, unless another ban remains."""
         actor = self.actor(world)
         others = {room for act in self.active(world) for room in act._banned_rooms}
         for room in self._banned_rooms:
@@ -159,7 +159,7 @@ class KeepOut(RobotIntervention, Lasting):
         """Return the rooms.
 
         Raises:
-            PlacementError: One of the names is no room of the home, and no kind of one.
+            PlacementError: A name is neither a room of the home nor a kind of its rooms.
         """
         rooms = world.home.rooms
         known = dict.fromkeys(name for room in rooms for name in room.words)
@@ -187,7 +187,7 @@ class SetBattery(RobotIntervention):
         battery_of(self.actor(world))
 
     def begin(self, world: World) -> None:
-        """Set it, and make the behaviors replan."""
+        """Set the charge, and make the behaviors replan."""
         actor = self.actor(world)
         charge = battery_of(actor)
         charge.follow(actor.motion, world.step * world.clock.step_us)
@@ -201,7 +201,7 @@ def battery_of(actor: Actor) -> Charge:
     """Return the charge of a robot's battery.
 
     Raises:
-        ScenarioError: It has no battery.
+        ScenarioError: The robot has no battery.
     """
     if actor.charge is None:
         raise ScenarioError(f"{actor.name} has no battery: add `battery` to the robot")
@@ -213,8 +213,8 @@ class Switch(Lasting):
 
     Attributes:
         entity: The robot; for a behavior also a person.
-        camera: Its camera, by name where it has several; true: all.
-        behavior: Its behavior, by its type.
+        camera: The camera, by name if the robot has several; true: all.
+        behavior: The behavior, by its type.
     """
 
     entity: str
@@ -248,7 +248,7 @@ class SwitchOff(Switch):
         return Disturbance(camera_name(self.camera), dark=True) if self.camera else None
 
     def begin(self, world: World) -> None:
-        """Switch it off."""
+        """Switch the camera or behavior off."""
         if self.behavior is None:
             disturb(world, self.entity)
             return
@@ -263,7 +263,7 @@ class SwitchOn(Switch):
     """Switch a camera or a behavior on again.
 
     Attributes:
-        duration: Not used: it stays on.
+        duration: Not used: the camera or behavior stays on.
 
     Example:
         >>> SwitchOn("astro", behavior="patrol").behavior
@@ -277,7 +277,7 @@ class SwitchOn(Switch):
         world.undo(self._switches_on)
 
     def _switches_on(self, act: object) -> bool:
-        """Return whether it undoes an intervention."""
+        """Return whether this undoes an intervention."""
         if not isinstance(act, SwitchOff):
             return False
         names = {camera_name(self.camera), camera_name(act.camera)} - {None}
@@ -308,7 +308,7 @@ class Trouble(RobotIntervention, Lasting):
         return self.loses_place
 
     def begin(self, world: World) -> None:
-        """Let it happen; a robot that is lost may find its place again by sight."""
+        """Apply the trouble; a robot that is lost may find its place again by sight."""
         if self.loses_place:
             world.emit(self.entity, EventKind.LOCALIZATION_LOST, "")
             after = relocalizes_after(self.actor(world))
@@ -317,8 +317,8 @@ class Trouble(RobotIntervention, Lasting):
         self._apply(world)
 
     def end(self, world: World) -> None:
-        """Undo it; the robot knows its place again, unless it is lost for another reason."""
-        self._apply(world)  # all that are still active
+        """End the trouble; the robot knows its place again unless it is lost otherwise."""
+        self._apply(world)  # the others may still be active
         is_lost_still = any(is_lost(act, self.entity) for act in world.lasting)
         if is_lost_still or not self.loses_place:
             return
@@ -339,20 +339,20 @@ class Trouble(RobotIntervention, Lasting):
 
 
 def is_lost(act: object, name: str) -> bool:
-    """Return whether because of an active intervention a robot doesn't know where it is."""
+    """Return whether an active intervention makes a robot lost."""
     return isinstance(act, Trouble) and act.loses_place and act.entity == name
 
 
 def relocalizes_after(actor: Actor) -> timedelta | None:
-    """Return for how long a robot has to see the home to know its place; None: it can't."""
+    """Return the time for which a robot has to see the home to know its place; None: it can't."""
     settings = getattr(actor.entity, "localization", None)
     return None if settings is None else settings.relocalizes
 
 
-# How long a crash or an update lasts, if neither the intervention nor the robot says so.
+# Crashes and updates last for these times by default.
 CRASH_LASTS = timedelta(minutes=1)
 UPDATE_LASTS = timedelta(minutes=15)
-# How long a robot that is on again needs to find out where it is, unless its localization says so.
+# By default, a robot that is on again needs this time to find out where it is.
 LOST_AFTER_BOOT = timedelta(minutes=1)
 
 
@@ -366,12 +366,12 @@ class SetPower(Trouble):
 
     Attributes:
         entity: The robot.
-        state: `off`: switched off, or its power is cut; `crash` and `update`: it is on again by
-            itself; `on`. A robot with an `empty` battery is off by itself (`battery` sets the
-            charge).
-        ends: With `on`: only what it is off for; left out: all but an empty battery.
-        duration: How long it is off; left out: until it is switched on, for a crash 1 min, and for
-            an update 15 min, unless the robot's `power` says otherwise.
+        state: `off`: the robot is switched off, or its power cut; `crash` and `update`: it is on
+            again by itself; `on`. A robot with an `empty` battery is off by itself (`battery` sets
+            the charge).
+        ends: With `on`: the only reason that ends; left out: all but an empty battery.
+        duration: Time for which it is off; left out: until it is switched on, 1 min for a crash,
+            and 15 min for an update, unless the robot's `power` says otherwise.
 
     Example:
         >>> SetPower("astro", state="off", duration="2 h").state
@@ -399,13 +399,13 @@ class SetPower(Trouble):
         return self.state != "on"
 
     def check(self, world: World) -> None:
-        """Refuse an unknown robot, and an empty battery that isn't."""
+        """Refuse an unknown robot, and the state `empty` of a charged battery."""
         actor = self.actor(world)
         if self.state == EMPTY and not battery_of(actor).is_empty:
             raise ScenarioError(f"the battery of {self.entity} isn't empty: set its charge instead")
 
     def _lasts(self, actor: Actor) -> timedelta | None:
-        """Return how long it lasts; None: until the robot is switched on."""
+        """Return the time until the robot is on again; None: until it is switched on."""
         power = power_of(actor.entity)
         if self.duration is not None or self.state not in ("crash", "update"):
             return self.duration
@@ -414,13 +414,13 @@ class SetPower(Trouble):
         return UPDATE_LASTS if power.updates is None else power.updates.lasts
 
     def begin(self, world: World) -> None:
-        """Switch it, at once."""
+        """Switch the robot at once."""
         actor = self.actor(world)
         if self.state == "on":
             is_empty = actor.charge is not None and actor.charge.is_empty
             world.undo(lambda act: self._switches(act, is_empty=is_empty))
             return
-        # What begins is a copy of what was asked for: it may say how long it lasts.
+        # This is a copy of the request, so its duration may be set here.
         vars(self)["duration"] = self._lasts(actor)
         was_on = not actor.is_off
         actor.off_for = actor.off_for or self.state
@@ -429,7 +429,7 @@ class SetPower(Trouble):
             world.switch_off(actor)
 
     def end(self, world: World) -> None:
-        """Let it begin anew, unless it is off for another reason."""
+        """Let the robot begin anew, unless it is off for another reason."""
         actor = self.actor(world)
         if self.state == "on" or not actor.is_off:
             return
@@ -443,12 +443,12 @@ class SetPower(Trouble):
         was_carried = world.switch_on(actor)
         world.emit(self.entity, EventKind.POWER_ON, reason)
         if was_carried or not power_of(actor.entity).keeps(PLACE):
-            actor.is_stuck = True  # until the next step, when it notices
+            actor.is_stuck = True  # the robot notices in the next step
             lasts = None if relocalizes_after(actor) else LOST_AFTER_BOOT
             world.later(Fault(entity=self.entity, lost=True, duration=lasts), timedelta(0))
 
     def _switches(self, act: object, *, is_empty: bool) -> bool:
-        """Return whether it ends what a robot is off for."""
+        """Return whether this ends the reason for which a robot is off."""
         if not is_off(act, self.entity):
             return False
         if self.ends is not None:
@@ -457,7 +457,7 @@ class SetPower(Trouble):
 
 
 def is_off(act: object, name: str) -> "TypeGuard[SetPower]":
-    """Return whether because of an active intervention a robot is off."""
+    """Return whether an active intervention keeps a robot off."""
     return isinstance(act, SetPower) and act.state != "on" and act.entity == name
 
 
@@ -473,7 +473,7 @@ class Fault(Trouble):
         wheels: Whether its wheels are stuck.
         lost: Whether its localization is lost.
         charger: Whether its charger is broken.
-        dark: A camera that is dark, by name where it has several; true: all.
+        dark: A camera that is dark, by name if the robot has several; true: all.
         detection: Factor of the probability that a user in view is noticed.
         errs: The errors of its cameras instead of the usual ones.
 
@@ -578,7 +578,7 @@ class Perceive(RobotIntervention):
                 user(world, detection.user)
 
     def begin(self, world: World) -> None:
-        """Let it perceive them."""
+        """Let the robot perceive the people."""
         sightings = [
             false_sighting(each.user, (each.x, each.y), each.heading_deg)
             for each in self.detections
@@ -587,15 +587,15 @@ class Perceive(RobotIntervention):
 
 
 def false_sighting(user: str, spot: tuple[float, float], heading_deg: float) -> FalseSighting:
-    """Return what a robot perceives, of a person or 'unknown', as cameras have it."""
+    """Return the false sighting of a person or 'unknown' in the form of cameras."""
     return FalseSighting("" if user == UNKNOWN else user, *spot, heading_of(heading_deg) or 0)
 
 
 class Relocalize(RobotIntervention):
-    """Let a robot know where it is: what keeps it lost is over.
+    """Let a robot know where it is, and end the interventions that keep it lost.
 
     Attributes:
-        by_sight: Only if one of its cameras sees; else it tries again, as often as its
+        by_sight: Whether one of its cameras has to see; else the robot tries again, as often as its
             `localization.relocalizes` says.
 
     Example:
@@ -606,7 +606,7 @@ class Relocalize(RobotIntervention):
     by_sight: bool = False
 
     def begin(self, world: World) -> None:
-        """End what keeps it lost, if it sees."""
+        """End the interventions that keep the robot lost, if it sees."""
         if not any(is_lost(act, self.entity) for act in world.lasting):
             return
         after = relocalizes_after(self.actor(world))
@@ -616,7 +616,7 @@ class Relocalize(RobotIntervention):
             world.undo(lambda act: is_lost(act, self.entity))
 
     def _sees(self, world: World) -> bool:
-        """Return whether one of its cameras isn't dark."""
+        """Return whether one of the robot's cameras isn't dark."""
         eyes = self.actor(world).entity.eyes
         return eyes.keys() != dark_cameras(eyes, disturbances_of(world, self.entity))
 
@@ -625,14 +625,14 @@ class Kidnap(Trouble):
     """Carry a robot elsewhere without its knowledge: it is lost there, until it knows its place.
 
     Meanwhile it stands still, and its behaviors don't decide. If it has errors of `localization`,
-    it believes to be where it was, and places whom it sees accordingly. `put` moves it with its
+    it believes itself to be where it was, and places people accordingly. `put` moves it with its
     knowledge.
 
     Attributes:
         entity: The robot.
         to: The place: a room, furniture, or a point.
-        duration: How long it takes at most until it knows where it is; left out: until it is
-            restored, or knows it by sight (`localization.relocalizes`).
+        duration: Longest time until the robot knows where it is; left out: until it is restored, or
+            knows by sight (`localization.relocalizes`).
 
     Example:
         >>> Kidnap("astro", "office").duration
@@ -653,7 +653,7 @@ class Kidnap(Trouble):
         self._put.check(world)
 
     def begin(self, world: World) -> None:
-        """Put it there, lost."""
+        """Put the robot there, lost."""
         actor = self.actor(world)
         before = actor.state
         self._put.begin(world)
@@ -661,7 +661,7 @@ class Kidnap(Trouble):
             displacements = actor.displacements
             moved = displaced(world.step, before, actor.state)
             last = displacements[-1] if displacements else None
-            if last is not None and last.end > world.step:  # carried off again before it knew
+            if last is not None and last.end > world.step:  # carried off again
                 displacements[-1] = last._replace(end=world.step)
                 turn = moved.turn + last.turn
                 moved = moved._replace(x=moved.x + last.x, y=moved.y + last.y, turn=turn)
@@ -688,8 +688,8 @@ def check_camera(actor: Actor, camera: bool | str | None) -> None:
     """Refuse an unknown camera of a robot.
 
     Raises:
-        ScenarioError: The robot doesn't have it, and the message lists those that it has; or it
-            perceives what a log has.
+        ScenarioError: The robot has no such camera, and the message lists its cameras; or it
+            perceives the sightings of a log.
     """
     eyes = actor.entity.eyes
     name = camera_name(camera)
@@ -748,7 +748,7 @@ class PerceptionIntervention(Trouble):
 
     Attributes:
         entity: The robot.
-        camera: The camera, by name where it has several; left out: all.
+        camera: The camera, by name if the robot has several; left out: all.
     """
 
     camera: str | None = None
@@ -813,10 +813,10 @@ class Mistake(PerceptionIntervention):
 class Inject(PerceptionIntervention):
     """Let a robot perceive a person who isn't there, in every look, wherever it looks.
 
-    In the table of observations it is a false positive: it has no true user.
+    In the table of observations this is a false positive, without a true user.
 
     Attributes:
-        user: The person that it perceives, or 'unknown'.
+        user: The perceived person, or 'unknown'.
         spot: The apparent place, [x, y] in metres.
         heading_deg: The apparent heading, counter-clockwise from +x.
 

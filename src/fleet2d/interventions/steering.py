@@ -1,4 +1,4 @@
-"""The intervention that steers a robot by velocities, as another program or a joystick does."""
+"""The intervention that steers a robot by velocities, as a program or a joystick does."""
 
 from datetime import timedelta
 
@@ -8,22 +8,22 @@ from fleet2d.entities.steering import AT_REST, Disc, Steering, Velocity
 from fleet2d.interventions.intervention import World
 from fleet2d.interventions.robots import RobotIntervention
 
-# A command holds so long: whoever steers repeats it, or the robot stops.
+# A command holds for this time: unless it is repeated, the robot stops.
 KEPT = timedelta(seconds=0.5)
 
 
 class Steer(RobotIntervention):
     """Move a robot at a velocity, within the limits of its drive.
 
-    It stops at walls, at shut doors, and in front of bodies; its behaviors decide again when the
-    time is over. A later command takes over at the speed that the robot has by then.
+    The robot stops at walls, at shut doors, and in front of bodies; its behaviors decide again when
+    the time is over. A later command takes over at the speed that the robot has by then.
 
     Attributes:
         entity: The robot.
-        forward: Its speed ahead, or back if negative.
-        left: Its speed to the left; 0 unless its drive is holonomic.
-        turn_deg: How fast it turns, counter-clockwise.
-        duration: How long.
+        forward: The speed ahead; negative: back.
+        left: The speed to the left; 0 unless the drive is holonomic.
+        turn_deg: The turn rate, counter-clockwise.
+        duration: Time for which the command holds.
 
     Example:
         >>> Steer("astro", forward=0.2, turn_deg="30 deg/s").duration
@@ -47,7 +47,7 @@ class Steer(RobotIntervention):
 
 
 def _bodies_near(actor: DecidingActor, world: World) -> list[Disc]:
-    """Return where the robot would touch the other bodies that are at home."""
+    """Return discs round the other bodies at home, in which the robot would touch them."""
     units = actor.home.lattice.units_per_m
     discs = []
     for other in (*world.users.values(), *world.robots.values()):
