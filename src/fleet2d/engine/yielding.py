@@ -1,11 +1,11 @@
 """Yielding: robots keep clear of people and of each other, wherever they stop, turn or pass.
 
-The ways of all bodies are known until their next decisions. At each step at which somebody will
-come too near to a robot within the next seconds, the robot gets another plan: it waits, goes round,
-stops beside, or steps aside and comes back. A plan is taken only if it meets nobody on the ways
-that are known. Of two robots the right of way says which one yields; the other one drives on, and
-stops at the last step if its way isn't free. So robots never overlap: whoever stops where it is
-has kept its distance, and nobody else drives into it.
+The paths of all bodies are known until their next decisions. Whenever somebody will come too near
+to a robot within the next seconds, the robot gets another plan: it waits, goes round, stops beside,
+or steps aside and comes back. A plan is taken only if it meets nobody on the known paths. Of two
+robots, the right of way says which one yields; the other drives on, and stops at the last step if
+its path isn't free. So robots never overlap: a robot that stops has kept its distance, and nobody
+else drives into it.
 
 People, logs and real bodies never change their ways. Where one of them walks into a robot that
 can't get out of the way, the two overlap, with an event.
@@ -36,24 +36,25 @@ from fleet2d.runtime.events import EventKind
 
 EndPlan = Callable[[int, int], None]
 
-# How far ahead a robot reacts to somebody to whom it yields.
+# A robot yields to encounters this far ahead.
 AHEAD = timedelta(seconds=5)
-# How far ahead the plan that it takes has to be free.
+# Its new plan has to be free for this long.
 FREE_FOR = timedelta(seconds=15)
-# The waits that it tries, in order.
+# It tries these waits in order.
 WAITS = tuple(timedelta(seconds=seconds) for seconds in (1, 2, 4, 8))
 WAITS_ASIDE = timedelta(seconds=2), timedelta(seconds=8)
-# How long a plan that isn't free for long is kept before the next try.
+# A plan that isn't free for long is kept for this time before the next try.
 PAUSE = timedelta(seconds=2)
-# Waiting for another robot for this long is a deadlock: the other one yields, for a while.
+# Waiting for another robot for this long is a deadlock, after which the other one yields for a
+# while.
 DEADLOCK = timedelta(seconds=10)
 SWAPPED_FOR = timedelta(seconds=30)
 # A wait that begins this soon after another one, and this near, continues it.
 SAME_WAIT = timedelta(seconds=15)
 SAME_PLACE_M = 1.5
-# How long it stands at most before it looks again.
+# A robot stands at most this long before it looks again.
 LONGEST_PAUSE = timedelta(minutes=10)
-# How long it waits in vain before it skips its stop.
+# After waiting in vain for this long, a robot skips its stop.
 GIVES_UP = timedelta(minutes=2)
 # Gap at which bodies pass, and gap at which a robot with the right of way stops [m].
 PASSING_GAP_M = 0.02
@@ -66,7 +67,7 @@ ASIDE_CELLS = 4
 ASIDE_TRIES = 12
 NO_WAITS = np.zeros(0, np.int64)
 
-# Whose motion counts.
+# These are values of `Distances.counts`.
 OWN_MOTION = 1
 OTHERS_MOTION = 2
 
@@ -77,9 +78,9 @@ class GivenWay(NamedTuple):
     Attributes:
         since: The step at which it began.
         last: The last step at which it had to wait.
-        place: Where it began [lattice].
-        swaps: How often it has ended a deadlock meanwhile.
-        pause: For how many steps it stood when it last found nothing better.
+        place: The position at which it began [lattice].
+        swaps: Number of deadlocks that it has ended meanwhile.
+        pause: Number of steps for which it stood when it last found nothing better.
     """
 
     since: int
@@ -91,13 +92,13 @@ class GivenWay(NamedTuple):
 
 @dataclass
 class Patience:
-    """A time in which a robot doesn't react to a body, as it can do nothing better.
+    """A time in which a robot doesn't react to a body, for want of anything better.
 
     Attributes:
         until: The step before which it lasts.
         planned_at: The step at which the other one began its plan; another plan ends it.
         other: The row of the other one.
-        ignores: Whether it ignores the other one, with whom it overlaps; else it only stops.
+        ignores: Whether the robot ignores the other body, since they overlap; else it only stops.
     """
 
     until: int
@@ -121,24 +122,24 @@ class Yielding(Watcher):
         self._number = {row: number for number, row in enumerate(self.rows)}
         self._rows = np.array(self.rows, np.int64)
         self._step_us = basis.clock.step_us
-        # Robots that are late for each other take the same poses later, whose views are known.
+        # Delayed robots take the same poses at later steps, whose views are cached.
         self._beat_us = self._step_us if len(self.rows) > 1 else 1
         self._ahead = self._steps(AHEAD)
         self._free_for = self._steps(FREE_FOR)
         self._tries = np.array(list(map(self._steps, WAITS)), np.int64)
         self._tries_aside = np.array(list(map(self._steps, WAITS_ASIDE)), np.int64)
         self._waits: dict[int, GivenWay] = {}
-        # When, and where, there was no way round.
+        # These are the steps and places at which there was no way round.
         self._looked_round: dict[int, tuple[int, object]] = {}
         self._told: dict[tuple[int, int], int] = {}
         self._patience: dict[tuple[int, int], Patience] = {}
-        self._pauses: dict[int, Patience] = {}  # of robots that stand as they found nothing better
+        self._pauses: dict[int, Patience] = {}  # of robots that found nothing better than to stand
         self._swapped: dict[tuple[int, int], int] = {}
         self._stuck: tuple[bool, ...] = ()
         self._distances: Distances | None = None
-        # What they keep without patience, and the pairs of robots that have swapped who goes first.
+        # The distances without patience, and the pairs of robots that have swapped their order.
         self._without_patience: tuple[list[tuple[int, int]], Distances] | None = None
-        self._strictest: tuple[I64, Distances] | None = None  # the leads that it is made from
+        self._strictest: tuple[I64, Distances] | None = None  # with its leads
         self.overlaps: dict[tuple[str, str], int] = {}
         if self.rows:
             self._set_up()
@@ -152,7 +153,7 @@ class Yielding(Watcher):
 
     @property
     def notes(self) -> list[str]:
-        """How often somebody who doesn't yield walked into a robot."""
+        """A remark on how often somebody who doesn't yield walked into a robot."""
         return [
             f"robots.{robot}: {other} walked into it {count} time{'s' if count > 1 else ''}"
             for (robot, other), count in self.overlaps.items()
@@ -174,7 +175,7 @@ class Yielding(Watcher):
         return end
 
     def _changes(self) -> Iterator[int]:
-        """Yield the steps at which robots begin to mind others again."""
+        """Yield the steps at which robots react to others again."""
         for patience in self._patience.values():
             yield patience.until
         for pause in self._pauses.values():
@@ -189,7 +190,7 @@ class Yielding(Watcher):
     def answer(
         self, step: int, outputs: Mapping[str, Any], begun: set[int], end_plan: EndPlan
     ) -> None:
-        """Give robots that would come too near to somebody other plans.
+        """Give other plans to robots that would come too near to somebody.
 
         Args:
             step: The present step, at which all bodies have decided.
@@ -203,7 +204,8 @@ class Yielding(Watcher):
             now = Situation(self._actors[row], step, (), outputs)
             for each, plan in self._plans(now, at, other):
                 self._follow(each, plan, begun, end_plan)
-        # Who would still drive into somebody within this step stops, then who drives into those.
+        # Robots that would still drive into somebody in this step stop, then those that would hit
+        # them.
         while found:
             found = self._meetings(self._strict(step), step, step + 1)
             for row, *_ in found:
@@ -224,7 +226,7 @@ class Yielding(Watcher):
         if after.position == actor.state.position:
             plan.notes[:0] = self._overlap_notes(now, self._hits(now))
 
-    # Whom each robot minds
+    # Distances to others
 
     def _set_up(self) -> None:
         """Compute the distances between bodies, and move robots that begin in others."""
@@ -240,7 +242,7 @@ class Yielding(Watcher):
         self._near = lattice(PASSING_GAP_M)
         self._least = lattice(LEAST_GAP_M)
         self._nothing = np.zeros_like(self._near)
-        self._strangers = np.zeros_like(self._near[:1])  # those who don't yield
+        self._strangers = np.zeros_like(self._near[:1])  # bodies that don't yield
         self._strangers[:, self._rows] = -1
         self._reach = self._near + SUB  # with room to move
         self._alone = np.full(touch.shape, OWN_MOTION, np.uint8)
@@ -249,7 +251,7 @@ class Yielding(Watcher):
         people = slice(self._users)
         for number, row in enumerate(self.rows):
             gives_way = getattr(actors[row].entity, "gives_way", None)
-            if gives_way is not None:  # `Clearance` lets it mind people that stand
+            if gives_way is not None:  # `Clearance` handles people that stand
                 self._counts[number, people] = OTHERS_MOTION
                 self._polite[number, people] = lattice(gives_way.distance)[number, people]
         self._passing = self._each(self._near, self._nothing)
@@ -261,7 +263,7 @@ class Yielding(Watcher):
             self._begin_apart(actors[row])
 
     def _each(self, near: I64, hard: I64) -> dict[int, Distances]:
-        """Return what each robot keeps from all bodies, whoever moves, by its row."""
+        """Return the distances of each robot from all bodies, whoever moves, by row."""
         nothing = self._nothing[:1]
         counts = np.zeros_like(self._counts[:1])
         return {
@@ -279,7 +281,7 @@ class Yielding(Watcher):
                 self._first[self._number[other], one] = not goes
 
     def _refresh(self, step: int) -> None:
-        """Take in that bodies have begun plans."""
+        """Update the distances after bodies have begun plans."""
         if not self._rule.is_fixed:
             self._order()
             self._distances = None
@@ -291,7 +293,7 @@ class Yielding(Watcher):
             self._without_patience = None
 
     def _present(self, step: int) -> Distances:
-        """Return what the robots keep from all bodies at a step."""
+        """Return the distances that robots keep from all bodies at a step."""
         may_end = self._patience or self._pauses or self._swapped
         if self._distances is not None and not may_end:
             return self._distances
@@ -311,7 +313,7 @@ class Yielding(Watcher):
         return self._distances
 
     def _kept(self, step: int) -> Distances:
-        """Return what the robots keep from all bodies at a step, if nobody decides before it."""
+        """Return the distances that robots keep at a step if nobody decides before it."""
         usual = self._usual(step)
         lead = usual.lead.copy()
         near = usual.near.copy()
@@ -339,7 +341,7 @@ class Yielding(Watcher):
         return Distances(lead, near, hard, counts)
 
     def _usual(self, step: int) -> Distances:
-        """Return what the robots keep from all bodies at a step without patience."""
+        """Return the distances that robots keep at a step without patience."""
         swapped = self._swapped_at(step)
         if self._without_patience is None or self._without_patience[0] != swapped:
             first = self._first_now(step)
@@ -366,7 +368,7 @@ class Yielding(Watcher):
         return first
 
     def _swapped_at(self, step: int) -> list[tuple[int, int]]:
-        """Return the pairs of robots that have swapped who goes first, and still do at a step."""
+        """Return the pairs of robots whose order is swapped at a step."""
         return [pair for pair, until in self._swapped.items() if until > step]
 
     def _strict(self, step: int) -> Distances:
@@ -385,7 +387,7 @@ class Yielding(Watcher):
     def _have_patience(
         self, now: Situation, other: int, steps: int, *, ignores: bool = False
     ) -> None:
-        """Let a robot not react to another body for some steps."""
+        """Make a robot ignore, or only stop for, another body for some steps."""
         planned_at = self._actors[other].planned_at
         patience = Patience(now.step + steps, planned_at, other, ignores)
         self._patience[now.actor.row, other] = patience
@@ -399,7 +401,7 @@ class Yielding(Watcher):
         if until is None:
             self._swapped[pair] = step + lasts
         elif step < until - lasts + self._steps(DEADLOCK):
-            return  # else two robots that are both blocked would swap it there and back
+            return  # else two blocked robots would swap there and back
         else:
             del self._swapped[pair]
         for one, another in ((row, other), (other, row)):
@@ -417,7 +419,7 @@ class Yielding(Watcher):
                 round_it = self._by_waiting(now, at, other)
                 if round_it is not None:
                     return [(now, self._noted(now, other, round_it))]
-            # For as long as the other one looks ahead: else it never has the time to get away.
+            # A shorter time than the other one looks ahead would never let it get away.
             stop = self._stop(now, self._ahead)
             return [(now, self._blocked(now, at, other, stop))]
         stays = self._hit_at_rest(now, self._everybody[row])
@@ -440,13 +442,13 @@ class Yielding(Watcher):
     def _in_vain(
         self, now: Situation, at: int, other: int, stays: tuple[int, int] | None
     ) -> Plan | None:
-        """Return what a robot does that found nothing better than to stop; None to go on."""
+        """Return the plan of a robot that can only stop; None to go on."""
         actor = self._actors[now.actor.row]
         pause = self._pause(now)
         if self._queues(actor, other, now.step, at):
             pause = max(pause, self._rest_of(other, now.step))
         is_hit = stays is not None and stays[0] <= at and other not in self._number
-        if is_hit and at > now.step:  # it is hit as early if it stops
+        if is_hit and at > now.step:  # stopping doesn't delay the hit
             self._have_patience(now, other, max(pause, at - now.step))
             return None
         if is_hit:
@@ -499,7 +501,7 @@ class Yielding(Watcher):
         return None if continued is None else plan_along(now, actor.plan, continued)
 
     def _passed(self, now: Situation, at: int, other: int) -> tuple[Situation, Plan] | None:
-        """Return how a robot with the right of way passes one that stands; None if it can't."""
+        """Return a plan to pass a standing robot with the right of way; None if it can't."""
         row = now.actor.row
         if other not in self._number or not self._rests(row, now.step):
             return None
@@ -510,7 +512,7 @@ class Yielding(Watcher):
     def _aside(self, now: Situation, at: int, kept: Distances) -> Plan | None:
         """Return a plan to step aside and come back, by the nearest place; None without one.
 
-        Where nothing lets it come back, it waits for as long as is known, and then looks again.
+        If it can't come back, it waits for the known time, and then looks again.
         """
         actor = self._actors[now.actor.row]
         cell = actor.home.lattice.cell
@@ -543,13 +545,13 @@ class Yielding(Watcher):
         return plan_along(now, now.actor.plan, continued)
 
     def _pause(self, now: Situation) -> int:
-        """Return for how many steps a robot stands before it looks again: longer and longer."""
+        """Return the number of steps to stand before the next look, larger each time."""
         wait = self._waits.get(now.actor.row)
         last = 0 if wait is None or not self._goes_on(wait, now) else wait.pause
         return min(max(self._steps(PAUSE), 2 * last), self._steps(LONGEST_PAUSE))
 
     def _overlapping(self, now: Situation, pause: int) -> Plan | None:
-        """Write once who walks into a robot now; it goes on as before, and minds them no more."""
+        """Note once who walks into a robot now; the robot goes on, ignoring them."""
         hits = self._hits(now)
         for other in hits:
             stays = self._steps(GIVES_UP) if self._rests(other, now.step) else pause
@@ -562,7 +564,7 @@ class Yielding(Watcher):
         return plan
 
     def _overlap_notes(self, now: Situation, others: list[int]) -> list[Note]:
-        """Return the notes that others walk into a robot now, where they aren't written yet."""
+        """Return new notes that others walk into a robot now."""
         row = now.actor.row
         robot = self._actors[row].name
         notes = []
@@ -577,13 +579,13 @@ class Yielding(Watcher):
         return notes
 
     def _hits(self, now: Situation) -> list[int]:
-        """Return who doesn't yield and walks into a robot in this step, if it stands still."""
+        """Return the bodies that would walk into a standing robot in this step without yielding."""
         row = now.actor.row
         kept = self._everybody[row]
         meeting_at_rest = self._bodies.timelines.meeting_at_rest
         hits = list[int]()
         lead = self._strangers
-        while True:  # mostly it is nobody
+        while True:  # mostly there is nobody
             only = kept._replace(lead=lead)
             _, other = meeting_at_rest(row, only, now.step, now.step + 1)
             if other < 0:
@@ -593,7 +595,7 @@ class Yielding(Watcher):
             lead[0, other] = -1
 
     def _noted(self, now: Situation, other: int, plan: Plan) -> Plan:
-        """Add to a plan that the robot gives way, at the beginning of a wait."""
+        """Add a note to a plan at the beginning of a wait that the robot gives way."""
         row = now.actor.row
         wait = self._waits.get(row)
         if wait is not None and self._goes_on(wait, now):
@@ -605,13 +607,13 @@ class Yielding(Watcher):
         return plan
 
     def _goes_on(self, wait: GivenWay, now: Situation) -> bool:
-        """Return whether a robot that has to wait now does so still."""
+        """Return whether a present wait of a robot continues an earlier one."""
         is_soon = now.step - wait.last <= self._steps(SAME_WAIT) + wait.pause
         moved = math.dist(wait.place, now.actor.state.position)
         return is_soon and moved <= self._same_place
 
     def _blocked(self, now: Situation, at: int, other: int, plan: Plan) -> Plan:
-        """Return what a robot does for which nothing is free: it waits, or skips its stop."""
+        """Return the plan of a blocked robot: to wait, or to skip its stop."""
         row = now.actor.row
         actor = self._actors[row]
         taken = self._is_taken(actor, other, now.step, at)
@@ -639,7 +641,7 @@ class Yielding(Watcher):
         return plan
 
     def _without_stop(self, now: Situation, name: str) -> Plan:
-        """Return the plan without the stop that it can't get to; else a step of standing."""
+        """Return the plan without the stop that can't be reached; else a step of standing."""
         actor = self._actors[now.actor.row]
         stands = timedelta(microseconds=self._step_us)
         plan = now.plan().stay(stands).note(EventKind.GIVES_UP, name)
@@ -650,20 +652,20 @@ class Yielding(Watcher):
             actor.behaviors[actor.arbiter.active].give_up(now)
         return now.plan().stay(stands).note(EventKind.GIVES_UP, name)
 
-    # What is free
+    # Free plans and places
 
     def _far(self, now: Situation) -> int:
         """Return the step up to which a plan has to be free."""
         return now.step + self._free_for
 
     def _hit_at_rest(self, now: Situation, kept: Distances) -> tuple[int, int] | None:
-        """Return the step at which somebody would come too near if it stood still, and who."""
+        """Return the step at which somebody would come too near to a standing robot, and who."""
         row = now.actor.row
         met = self._bodies.timelines.meeting_at_rest(row, kept, now.step, self._far(now))
         return None if met[0] < 0 else met
 
     def _is_free(self, now: Situation, plan: Plan) -> bool:
-        """Return whether a plan brings a robot too near to nobody, as far as is known."""
+        """Return whether a plan keeps a robot clear of everybody, as far as is known."""
         motion = plan.finish()
         if not isinstance(motion, Track):
             return True
@@ -678,13 +680,13 @@ class Yielding(Watcher):
         return self._bodies.timelines.rests(row, step, step + self._free_for)
 
     def _standing(self, now: Situation) -> I64:
-        """Return where others stand, or will have stopped; and the distances to keep, (n, 3)."""
+        """Return where others stand or will stop, and the distances to keep: int64 (n, 3)."""
         row = now.actor.row
         reach = self._reach[self._number[row]]
         return self._bodies.timelines.standing(row, now.step, self._free_for, reach)
 
     def _stop_of(self, actor: DecidingActor, step: int) -> LatticePoint | None:
-        """Return where a body stops after a step, or is; None if it walks at random."""
+        """Return the next stop of a body after a step, or its position; None for a random walk."""
         motion = actor.motion
         if not isinstance(motion, Track):
             return None
@@ -707,7 +709,7 @@ class Yielding(Watcher):
         return goes_charging and self._is_taken(actor, other, step, at)
 
     def _rest_of(self, row: int, step: int) -> int:
-        """Return for how many steps a body surely stays where it is: a power of two of them."""
+        """Return the number of steps for which a body surely stays: a power of two."""
         steps = self._free_for
         rests = self._bodies.timelines.rests
         while steps < self._steps(LONGEST_PAUSE) and rests(row, step, step + 2 * steps):
@@ -715,7 +717,7 @@ class Yielding(Watcher):
         return steps
 
     def _keeps_its_place(self, now: Situation, at: int, other: int) -> bool:
-        """Let a robot that wants to stop where this one stands yield; return whether it does."""
+        """Let a robot yield that wants to stop where another stands; return whether it does."""
         row = now.actor.row
         if other not in self._number or _pair(row, other) in self._swapped:
             return False

@@ -1,1 +1,1 @@
-"""What lives in the home: users and robots, their behaviors and plans."""
+"""Bodies in the home: users and robots, their behaviors and plans."""

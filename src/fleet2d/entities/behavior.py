@@ -1,4 +1,4 @@
-"""Behaviors and the bodies that they decide for: what a behavior is asked, knows and returns."""
+"""Behaviors, the situations in which they decide, and the bodies that they decide for."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,15 +25,15 @@ from fleet2d.runtime.clock import DAY, MICROSECOND, Sun, midnight_of
 from fleet2d.runtime.determinism import Draws
 from fleet2d.runtime.local_time import next_reading, written
 
-# After this time, a body tries again to pass a shut door.
+# A body tries again to pass a shut door after this time.
 DOOR_WAIT = timedelta(seconds=10)
 
 
 class HoursSpan(NamedTuple):
-    """Hours of some days of the week; those that end before they begin last past midnight.
+    """Hours on some days of the week; hours that end before they begin last past midnight.
 
-    They hold whenever the clock reads a time within them: hours that it reads twice, as clocks are
-    put back, last longer on that day.
+    Hours hold whenever the clock reads a time within them, so hours that it reads twice, when put
+    back, last longer.
 
     Attributes:
         days: The days on which the hours begin, 0 is Monday.
@@ -55,11 +55,11 @@ class HoursSpan(NamedTuple):
             moment = next_reading(moment, end)
             if written(moment) == end:
                 return moment
-            end = self._end_of(written(moment))  # the clock was changed before
+            end = self._end_of(written(moment))  # the clock was changed since
         return None if moment is time else moment
 
     def next_begin(self, time: datetime) -> datetime:
-        """Return when the hours begin next after a moment."""
+        """Return the next beginning of the hours after a moment."""
         while True:
             reading = written(time)
             days = (midnight_of(reading) + i * DAY for i in range(8))
@@ -165,13 +165,13 @@ def holds(hours: "Sequence[HoursSpan | Sun]", time: datetime) -> datetime | None
 
 
 class Attention(NamedTuple):
-    """How near a robot has to be for a person to react: distances between the middles [lattice].
+    """The distances between the middles at which a person reacts to a robot [lattice].
 
     Attributes:
         notices: A robot in sight and nearer than this is the event robot_near.
         in_way: A robot nearer than this that drives up to a standing person: robot_coming.
         too_close: A robot that stays nearer than this: robot_close.
-        patience: Number of steps after which a robot that is too close is an event.
+        patience: Number of steps too close after which robot_close happens.
         hears: A robot that calls within this distance: robot_calls.
     """
 
@@ -183,7 +183,7 @@ class Attention(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a user or an app calls a robot to do: see `Behavior.answers`.
+    """A call of a robot by a user or an app: see `Behavior.answers`.
 
     Attributes:
         do: The kind of command: "come", "find", "dock", or one that a custom behavior answers.
@@ -212,7 +212,7 @@ class SightEvent(NamedTuple):
             robot_near, robot_coming, robot_close or robot_calls, see `Attention`; called, when a
             robot got a command, see `Situation.command`; or the name of an interrupt.
         user: The user as perceived, empty if not recognized; or the robot; empty for interrupts.
-        x: Where the user or the robot was perceived last; of an interrupt, where the body is [m].
+        x: The last perceived position of the user or robot; for an interrupt, that of the body [m].
         y: Likewise.
     """
 
@@ -224,10 +224,10 @@ class SightEvent(NamedTuple):
 
 @dataclass(frozen=True, init=False)
 class Situation:
-    """What a behavior knows when it is asked for a plan.
+    """The knowledge of a behavior that is asked for a plan.
 
     Attributes:
-        actor: The body, and what it does.
+        actor: The body, with its plan.
         step: The step at which the plan begins.
         events: The events that interrupted the last plan; empty if it just ended.
         outputs: The newest output of every algorithm, by its name in the scenario.
@@ -247,7 +247,7 @@ class Situation:
         events: Sequence[SightEvent] = (),
         outputs: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
-        # At once, as a run makes many.
+        # A run makes many situations, so the fields are set at once.
         time = actor.clock.time(step)
         self.__dict__.update(actor=actor, step=step, events=events, outputs=outputs, time=time)
 
@@ -258,7 +258,7 @@ class Situation:
 
     @property
     def xy(self) -> tuple[float, float]:
-        """Where the body is [m]."""
+        """The position of the body [m]."""
         return self.actor.xy
 
     @property
@@ -277,12 +277,12 @@ class Situation:
 
     @property
     def command(self) -> Command | None:
-        """What the body was called to do, until a behavior takes it up."""
+        """The command to the body, until a behavior takes it up."""
         return self.actor.command
 
     @property
     def requests(self) -> RequestQueue | None:
-        """What the robot wants of people at present; None: the scenario has no interactions."""
+        """The robot's present requests to people; None: the scenario has no interactions."""
         return self.actor.requests
 
     def take_command(self, do: str) -> Command | None:
@@ -294,7 +294,7 @@ class Situation:
         return command
 
     def nearest_free(self, x: float, y: float) -> tuple[float, float]:
-        """Return the place nearest to (x, y) [m] where the body fits and that it can get to."""
+        """Return the nearest place to (x, y) [m] that the body fits in and can reach."""
         actor = self.actor
         lattice = self.home.lattice
         at_x, at_y = lattice.point_at((x, y))
@@ -339,26 +339,26 @@ class Behavior(Component):
     """
 
     kind = "behavior"
-    # Whether, after an interruption by a behavior before it, it resumes the rest of its plan.
+    # Whether it resumes its plan after an interruption by an earlier behavior.
     resumes: ClassVar[bool] = False
-    # Layers of what its robot has seen that it reads: explored, first_seen, last_seen …
+    # Layers of seen cells that it reads: explored, first_seen, last_seen …
     needs: ClassVar[frozenset[str]] = frozenset()
-    # Kinds of events that its plans record: all of its own, and those of EventKind that a script
-    # may wait for.
+    # Kinds of events that its plans record: all kinds of its own, and those of EventKind that a
+    # script may wait for.
     records: ClassVar[frozenset[str]] = frozenset()
     # Events at which it may interrupt the behaviors after it: all that `awaits` can return.
     listens: ClassVar[frozenset[str]] = frozenset()
-    # Whether it does nothing in a scenario in which its robot wants nothing of people.
+    # Whether it does nothing in a scenario without requests of its robot to people.
     serves_requests: ClassVar[bool] = False
-    # Whether it is where a log or a real body is, which nothing in the run may change.
+    # Whether it follows a log or a real body, whose positions nothing in the run may change.
     is_recorded: ClassVar[bool] = False
-    # Whether it reads what its robot remembers of its sightings, by `actor.recall`.
+    # Whether it reads its robot's memory of sightings, by `actor.recall`.
     remembers: ClassVar[bool] = False
-    # Whether it has a plan whenever it is asked, so that none after it is.
+    # Whether it always has a plan, so that later behaviors are never asked.
     always_decides: ClassVar[bool] = False
     # Kinds of commands that it carries out: find, come, dock, or a name of its own.
     answers: ClassVar[frozenset[str]] = frozenset()
-    # Height of a user with it, unless the scenario says it [m].
+    # Default height of a user with this behavior [m].
     usual_height: ClassVar[float] = 1.7
 
     when: Hours = ()
@@ -366,14 +366,14 @@ class Behavior(Component):
     preempts: bool = True
 
     def start(self, actor: "Actor") -> None:
-        """Prepare for a run; check here that the places it names exist."""
+        """Prepare for a run, and check that the named places exist."""
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
-        """Return where the body is when the run begins: None: drawn; (): away."""
+        """Return the place of the body when the run begins; None: drawn; (): away."""
         return None
 
     def attention(self, actor: "Actor") -> Attention | None:
-        """Return which actions of robots interrupt any plan of the body; None: none do."""
+        """Return the attention of the body, whose events interrupt any of its plans; None: none."""
         return None
 
     def reacts_to(self, actor: "Actor", event: SightEvent, step: int) -> bool:
@@ -381,26 +381,26 @@ class Behavior(Component):
         return True
 
     def furniture(self, actor: "Actor", kind: str) -> str | None:
-        """Return the name of the piece of furniture of a kind that it always uses, if any."""
+        """Return the name of the piece of furniture of a kind that the body always uses, if any."""
         return None
 
     def give_up(self, now: Situation) -> None:
-        """Stop what it is doing: its present plan can't be continued."""
+        """Give up the present plan, which can't be continued."""
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when it wants to be asked while the body follows a plan of a later behavior."""
+        """Return the time at which to ask this behavior during a plan of a later one."""
         return None
 
     def awaits(self, now: Situation) -> frozenset[str]:
-        """Return at which events it is asked while the body follows a plan of a later behavior."""
+        """Return the events at which to ask this behavior during a plan of a later one."""
         return self.listens
 
     def about(self) -> tuple[str, ...]:
-        """Return the users that its fields name; a scenario that lacks one of them is refused."""
+        """Return the users named by its fields; a scenario that lacks one of them is refused."""
         return ()
 
     def reads(self) -> tuple[str, ...]:
-        """Return the algorithms that it reads; a scenario that lacks one of them is refused."""
+        """Return the algorithms to read; a scenario that lacks one of them is refused."""
         return ()
 
     def takes(self, command: Command) -> bool:
@@ -408,23 +408,23 @@ class Behavior(Component):
         return command.do in self.answers
 
     def activities(self) -> tuple[str, ...]:
-        """Return the names of the activities that it can perform."""
+        """Return the names of the activities that the behavior can perform."""
         return ()
 
     def perform(self, plan: Plan, activity: str) -> None:
-        """Add the way to where one of its activities is done to a plan."""
+        """Add the way to the place of an activity to a plan."""
         raise NotImplementedError
 
     def leaves_turns(self) -> bool:
-        """Return whether behaviors after it may ever be asked."""
+        """Return whether later behaviors may ever be asked."""
         return not self.always_decides or bool(self.when or self.cooldown)
 
     def busy(self) -> bool:
-        """Return whether it is in the middle of something that hours and cooldown don't end."""
+        """Return whether a task is under way that hours and cooldown don't end."""
         return False
 
     def dismiss(self) -> None:
-        """Drop what it is in the middle of, as the robot was sent away; by default nothing."""
+        """Drop the present task, since the robot was sent away; by default, do nothing."""
 
     def decide(self, now: Situation) -> Plan | None:
         """Return the plan from now on; None leaves the decision to the next behavior."""
@@ -436,18 +436,18 @@ class Actor(Body):
     """A body with behaviors, and the plan that it follows.
 
     Attributes:
-        behaviors: Its own copies of the behaviors of its configuration, the first one first.
+        behaviors: Copies of the behaviors of its configuration, in order.
         charge: The charge of its battery; None without a battery.
-        requests: What it wants of people; None without interactions.
-        command: What it was called to do, until a behavior takes it up.
-        displacements: When it believes to be elsewhere, as it was carried off.
+        requests: Its requests to people; None without interactions.
+        command: The command to it, until a behavior takes it up.
+        displacements: Periods in which it believes itself elsewhere after being carried off.
         bans: The rooms that it was told to keep out of, and the first step at which it may enter.
         in_view: Returns the people that its cameras have in view, and the last place of each [m].
-        recall: Returns the robot's `SightingMemory`, if a behavior of it `remembers`.
+        recall: Returns the robot's `SightingMemory`, if one of its behaviors `remembers`.
         plan: The plan that it follows.
         motion: The motion of that plan.
         planned_at: The step at which it began the plan.
-        off_for: Why it is off, as `SetPower.state` says; None: it is on.
+        off_for: The reason for being off, a `SetPower.state`; None: it is on.
     """
 
     behaviors: list[Behavior] = field(init=False)
@@ -456,16 +456,16 @@ class Actor(Body):
         super().__post_init__()
         self.in_view: Callable[[], Mapping[str, Point]] = dict  # set if it has cameras
         self.recall: Callable[[], Any] = dict  # set if it remembers
-        # Before they start, to begin anew with.
+        # Copies that haven't started, to begin anew with.
         self._declared = list(getattr(self.entity, "behaviors", ()))
         self.requests: RequestQueue | None = None  # set if the scenario has interactions
         self.behaviors = [behavior.model_copy(deep=True) for behavior in self._declared]
         self.displacements: list[Displacement] = []
         self.sleepers: Callable[[], Any] | None = None  # set if it keeps out of bedrooms
-        self.ruled = self.kept_out - self.forbidden  # the zones of its rules that hold at present
+        self.ruled = self.kept_out - self.forbidden  # zones of its rules that hold at present
         with blame(self.path, None):
             self._state = self._first_pose()
-            self.kept_out = self.forbidden  # behaviors prepare for the hours without
+            self.kept_out = self.forbidden  # behaviors prepare for hours without rules
             self._note_lost_rooms()
             battery = getattr(self.entity, "battery", None)
             self.charge = None if battery is None else Charge(battery, self)
@@ -488,7 +488,7 @@ class Actor(Body):
         """Replace a behavior, by its number, with another one, which starts.
 
         Raises:
-            InputError: It can't start; the present one stays.
+            InputError: The new behavior can't start; the present one stays.
         """
         started = behavior.model_copy(deep=True)
         started.start(self)
@@ -498,60 +498,60 @@ class Actor(Body):
 
     @property
     def is_recorded(self) -> bool:
-        """Whether what it does is recorded, so that it can't do anything else."""
+        """Whether its motion is recorded, so that it can't do anything else."""
         return any(behavior.is_recorded for behavior in self.behaviors)
 
     @property
     def is_off(self) -> bool:
-        """Whether it is off: it neither moves, nor sees, nor hears."""
+        """Whether the body is off: it neither moves, nor sees, nor hears."""
         return self.off_for is not None
 
     def banned(self, step: int) -> frozenset[int]:
-        """Return the rooms, by index, and areas that it has to keep out of at a step."""
+        """Return the rooms, by index, and areas from which it is banned at a step."""
         bans = (room for room, until in self.bans.items() if until > step)
         return self.forbidden.union(self.ruled, bans)
 
     def rules_at(self, time: datetime) -> frozenset[int]:
-        """Return the zones that its rules keep it out of at a local time, as it believes."""
+        """Return the zones that its rules forbid at a local time, by its belief."""
         if self.rules is None:
             return frozenset()
         rooms = frozenset[int]() if self.sleepers is None else self.sleepers().rooms
         return self.rules.active(time, rooms)
 
     def ask(self, step: int | None) -> None:
-        """Set the step at which it decides next; None: never."""
+        """Set the step of the next decision; None: never."""
         if self._bodies is not None:
             self._bodies.ask_at[self.row] = NEVER if step is None else step
 
     @property
     def asked_at(self) -> int | None:
-        """The step at which it decides next, if nothing interrupts it; None: never."""
+        """The step of the next decision without interruptions; None: never."""
         at = NEVER if self._bodies is None else int(self._bodies.ask_at[self.row])
         return None if at == NEVER else at
 
     @property
     def attention(self) -> Attention | None:
-        """Which actions of robots interrupt its plans: those of the first attentive behavior."""
+        """The attention of the first attentive behavior, whose events interrupt plans."""
         return self._attentive[1] if self._attentive else None
 
     def may_record(self, event: str) -> bool:
-        """Return whether one of its behaviors declares a kind of events in `records`."""
+        """Return whether a behavior declares a kind of events in `records`."""
         return any(event in behavior.records for behavior in self.behaviors)
 
     def own_furniture(self, kind: str) -> PlacedObject | None:
-        """Return the piece of furniture of a kind that is its own, if its behaviors say so."""
+        """Return the body's own piece of furniture of a kind, if its behaviors name one."""
         names = (behavior.furniture(self, kind) for behavior in self.behaviors)
         return next((self.home.object(name) for name in names if name is not None), None)
 
     def posture_code(self, time_us: int) -> int:
         """Return the posture at a moment, by its number in POSTURES."""
-        plan: Plan | None = getattr(self, "plan", None)  # none yet while the first one is made
+        plan: Plan | None = getattr(self, "plan", None)  # there is none while the first one is made
         if plan is None or not (plan.postures or plan.posture != "stand"):
             return 0
         return plan.posture_at(time_us)
 
     def _note_lost_rooms(self) -> None:
-        """Note the rooms that it can't get to, as every way there leads through forbidden ones."""
+        """Note the rooms that can't be reached, since every way leads through forbidden ones."""
         if self.rules is None or self._state.away:
             return
         whole = self.whole_space
@@ -565,7 +565,7 @@ class Actor(Body):
                 space = self.space_without(kept_out)
             except FloorPlanError:
                 continue
-            # Where it stands in one of them, it is what remains of the largest part that counts.
+            # For a body within a forbidden zone, the remainder of the largest part counts.
             part = max(space.part_at(x, y), 0)
             lost = within_reach - space.rooms_of(part) - kept_out - told
             told |= lost
@@ -599,5 +599,5 @@ class Actor(Body):
 
 
 def is_own(actor: Actor) -> bool:
-    """Whether a body has a behavior that isn't Fleet2D's."""
+    """Return whether a body has a behavior that isn't Fleet2D's."""
     return any(not type(b).__module__.startswith("fleet2d.") for b in actor.behaviors)

@@ -1,4 +1,4 @@
-"""Bodies: how a scenario declares them, how they move, and where in a home they can be."""
+"""Bodies: their settings in a scenario, their motion, and their places in a home."""
 
 import copy
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -66,17 +66,17 @@ class Pose(NamedTuple):
 
     @property
     def position(self) -> LatticePoint:
-        """Where the body is [lattice]."""
+        """The position of the body [lattice]."""
         return self.x, self.y
 
 
-# Makes a pose from a tuple of its fields without calling Python code, as a run has many.
+# A run has many poses: this makes one from a tuple of its fields without calling Python code.
 new_pose: Callable[[tuple[int, int, int, int]], Pose] = partial(tuple.__new__, Pose)
 
 
 @dataclass(frozen=True)
 class Track:
-    """A motion along breakpoints that are known beforehand."""
+    """A motion along known breakpoints."""
 
     breakpoints: Breakpoints
     step_us: int
@@ -95,36 +95,36 @@ Motion = Track | RandomWalk
 
 
 class KeepsOut(Protocol):
-    """Where a body keeps out: see `fleet2d.entities.keep_out.KeepOutRules`."""
+    """The zones that a body keeps out of: see `fleet2d.entities.keep_out.KeepOutRules`."""
 
     always: frozenset[int]
     no_stops: frozenset[int]
 
     @property
     def timed(self) -> Sequence[Any]:
-        """The zones that it keeps out of at some times."""
+        """The zones that are forbidden at some times."""
 
     @property
     def minds_sleep(self) -> bool:
-        """Whether it depends on where somebody sleeps."""
+        """Whether zones depend on where somebody sleeps."""
 
     def active(self, time: datetime, sleepers: frozenset[int]) -> frozenset[int]:
-        """Return the zones of `timed` that it keeps out of at a local time."""
+        """Return the zones of `timed` that are forbidden at a local time."""
 
     def changes_at(self, time: datetime) -> Iterator[datetime]:
-        """Yield when hours begin or end after a local time."""
+        """Yield the times after a local time at which hours begin or end."""
 
 
 class BodySettings(Settings):
-    """A body in the home: its size, how fast it moves, and where it is at first.
+    """A body in the home: its size, its speed, and its first pose.
 
     Attributes:
         radius: Radius of the body [m].
         height: Its height, standing [m], for `sight.heights`; left out: 1.7 m for a person, 0.3 m
             for a pet, 0.4 m for a robot.
         speed: Walking speed [m/s].
-        turn_rate_deg: How fast it turns on the spot [deg/s].
-        start: Where it is at first; left out: where its behavior would be, else drawn.
+        turn_rate_deg: Rate of turning on the spot [deg/s].
+        start: Its first place; left out: that of its behavior, else drawn.
         start_heading_deg: Heading at first, counter-clockwise from +x; left out: drawn.
         color: Color in pictures.
         opens_doors: Opens doors in its way; else a shut door is a wall to it.
@@ -138,45 +138,45 @@ class BodySettings(Settings):
     start_heading_deg: AngleDeg | None = None
     color: str | None = Field(default=None, min_length=1)
     opens_doors: bool = False
-    # Whether all bodies of its kind climb stairs and take lifts.
+    # Whether all bodies of the class climb stairs and take lifts.
     uses_portals: ClassVar[bool] = False
-    # Whether its routes are the cheapest by the costmap, if there is one, and not the shortest.
+    # Whether its routes are the cheapest by the costmap, if there is one, instead of the shortest.
     minds_costs: ClassVar[bool] = False
     # Whether wet floors, carpets and edges slow it down.
     minds_floor: ClassVar[bool] = False
     # Whether it sits or lies on furniture that a place names, instead of stopping before it.
     uses_furniture: ClassVar[bool] = False
-    # Its height, if the scenario doesn't say [m].
+    # The default height [m].
     usual_height: ClassVar[float] = 1.7
-    # What happens when its cameras lose somebody, and when they see somebody.
+    # The events of its cameras: somebody is lost, somebody is seen.
     sight_events: ClassVar[tuple[str, str]]
-    # What it hears about what it wants of people.
+    # The events about its requests to people.
     request_events: ClassVar[frozenset[str]] = frozenset()
 
     @property
     def climbs_stairs(self) -> bool:
-        """Whether it climbs stairs and takes lifts."""
+        """Whether the body climbs stairs and takes lifts."""
         return self.uses_portals
 
     def keep_out_rules(self, body: "Body") -> KeepsOut | None:
-        """Return where its body keeps out; None if it may go everywhere."""
+        """Return the rules by which the body keeps out of zones; None if it may go everywhere."""
         return None
 
     @property
     def eyes(self) -> dict[str, Camera]:
-        """Its cameras by name; none, unless a subclass has some."""
+        """The cameras by name; empty unless a subclass has some."""
         return {}
 
     @property
     def tall(self) -> float:
-        """Its height, standing [m]."""
+        """The standing height [m]."""
         return self.usual_height if self.height is None else self.height
 
     def check_interrupt(self, name: str) -> None:
-        """Check that an event may end its plans: one of its cameras, or a registered interrupt.
+        """Check that an event may end plans: an event of cameras, or a registered interrupt.
 
         Raises:
-            ComponentError: There is none of that name, or it needs a camera.
+            ComponentError: There is no such event, or it needs a camera.
         """
         own = self.sight_events if self.eyes else ()
         if name in own or name in self.request_events:
@@ -195,7 +195,7 @@ NEVER = 1 << 62
 """The step of what never happens."""
 
 
-# When the posture of who only stands changes, and the postures: see `Plan.posture_times`.
+# The `Plan.posture_times` of a body that only stands.
 STANDING = np.zeros(0, np.int64), np.zeros(1, np.int8)
 
 
@@ -244,9 +244,10 @@ class Bodies:
 
         Args:
             row: The body.
-            motion: How it moves.
-            begin: Its pose at the present step.
-            postures: When its posture changes [us], int64 (n,), and the postures, int8 (n + 1,).
+            motion: The motion.
+            begin: The pose at the present step.
+            postures: Times at which the posture changes [us], int64 (n,), and the postures, int8 (n
+                + 1,).
         """
         if isinstance(motion, RandomWalk):
             self.timelines.walk(row, self.step, motion.walls, motion.space, motion.rule, begin[:3])
@@ -304,11 +305,11 @@ class PlaceAt(NamedTuple):
 
     Attributes:
         thing: The object.
-        x: Where the body is while it uses it [lattice].
+        x: Position of the body while it uses the object [lattice].
         y: Likewise.
-        heading: Where the body faces [1/4096 turn].
-        posture: How the body is there.
-        approach: The free point from which it steps there [lattice].
+        heading: Heading of the body [1/4096 turn].
+        posture: Posture of the body.
+        approach: The free point from which the body steps there [lattice].
     """
 
     thing: PlacedObject
@@ -334,14 +335,14 @@ class Body:
         clock: The clock of the run.
         seed: The seed of the run.
         people: All users of the scenario by name; None for one that isn't built yet.
-        notes: Which kinds of rooms and furniture the home lacks, so that keys were left out.
+        notes: Remarks on kinds of rooms and furniture that the home lacks.
         part: The connected part of its space that it is in.
-        rules: Where its configuration keeps it out; None: nowhere.
+        rules: The configured rules of keeping out; None: none.
         forbidden: The rooms, by index, and areas that it never enters: see `Home.area`.
-        kept_out: Those that its ways avoid now: these, those of its rules, and those of bans.
+        kept_out: The zones that its ways avoid now: `forbidden`, and those of its rules and bans.
         row: Its row among the bodies of the run.
-        interrupts: The events that have ended, or may end, its plans so far: they are checked.
-        drive: How it moves along routes; None: as `Differential`, which the core computes.
+        interrupts: The events in its plans so far, which have been checked.
+        drive: Its drive along routes; None: `Differential`, which the core computes.
     """
 
     name: str
@@ -382,13 +383,13 @@ class Body:
         self.interrupts: frozenset[str] = frozenset()
 
     def join(self, bodies: Bodies, row: int) -> None:
-        """Become one of the bodies of a run, whose clock and poses it uses from then on."""
+        """Join the bodies of a run, whose clock and poses are used from then on."""
         self._bodies = bodies
         self.row = row
 
     @property
     def state(self) -> Pose:
-        """Where it is at the present step."""
+        """The pose at the present step."""
         bodies = self._bodies
         if bodies is not None and self._state_step != bodies.step:
             self._state = bodies.pose_at(self.row, bodies.step)
@@ -404,8 +405,8 @@ class Body:
 
     @property
     def space(self) -> Space:
-        """Where its body can be at present."""
-        (version, costs_version, kept_out), space = self._space  # nearly always up to date
+        """The space in which the body can be at present."""
+        (version, costs_version, kept_out), space = self._space  # mostly up to date
         if version == self.home.version and kept_out is self.kept_out:
             costs = self.home.costs_version if self.entity.minds_costs else 0
             if costs_version == costs:
@@ -417,23 +418,23 @@ class Body:
 
     @property
     def arrangement(self) -> Arrangement:
-        """What its space depends on: the versions of home and costs, rooms to keep out of."""
+        """The key of its space: the versions of home and costs, and rooms to keep out of."""
         costs = self.home.costs_version if self.entity.minds_costs else 0
         return self.home.version, costs, self.kept_out
 
     @property
     def may_block_routes(self) -> bool:
-        """Whether routes may be closed to it that were open before, or will be."""
+        """Whether routes may be open to it at some times only."""
         has_hours = self.rules is not None and bool(self.rules.timed)
         return self.home.may_block_routes or has_hours or self.kept_out != self.forbidden
 
     @property
     def whole_space(self) -> Space:
-        """Where its body fits at present, also in rooms that it keeps out of: carried there."""
+        """The space in which the body fits at present, including rooms to keep out of."""
         return self._space_outside(frozenset())
 
     def space_without(self, rooms: frozenset[int] = frozenset()) -> Space:
-        """Return where its body can be at present outside of some rooms, by their indices."""
+        """Return the space in which the body can be outside of some rooms, by their indices."""
         return self._space_outside(self.kept_out | rooms)
 
     def _space_outside(self, rooms: frozenset[int]) -> Space:
@@ -447,7 +448,7 @@ class Body:
         return self.home.costed(space) if entity.minds_costs else space
 
     def _present_part(self) -> int:
-        """Return the part of a changed space that it is in, or nearest to."""
+        """Return the part of a changed space that holds the body, or is nearest."""
         space = self._space[1]
         position = self.state.position
         x, y = self.home.approach_of(position) or position
@@ -463,17 +464,17 @@ class Body:
         return 0
 
     def may_record(self, event: str) -> bool:
-        """Return whether its plans may record a kind of events besides those of Fleet2D."""
+        """Return whether plans may record a kind of events besides those of Fleet2D."""
         return False
 
     @property
     def slows(self) -> tuple[SlowRegion, ...]:
-        """The regions that slow it down at present: robots only."""
+        """The regions that slow the body down at present, for robots only."""
         return self.home.slows if self.entity.minds_floor else ()
 
     @property
     def way_out(self) -> LatticePoint:
-        """The lattice point where it leaves the home."""
+        """The lattice point at which the body leaves the home."""
         return self.home.way_out(self.space, self.part)
 
     def place_at(self, thing: PlacedObject | str, place: int) -> PlaceAt:
@@ -504,9 +505,9 @@ class Body:
         return at
 
     def step_off(self, x: int, y: int) -> LatticePoint | None:
-        """Return where it steps off the object on which it is at a lattice point; None: nowhere."""
+        """Return the free point beside an object that the body is on; None: it is on none."""
         approach = self.home.approach_of((x, y))
-        # Chairs round a table may leave a gap in which a body fits, but which it can't walk out of.
+        # Chairs round a table may leave a gap in which a body fits without a way out.
         if approach is None:
             return None
         space = self.space
@@ -518,15 +519,15 @@ class Body:
 
     @property
     def xy(self) -> tuple[float, float]:
-        """Where it is [m]."""
+        """The position [m]."""
         return self.home.lattice.xy_of(*self.state.position)
 
     def stream(self, purpose: str) -> np.uint64:
-        """Return the key of its random stream for a purpose."""
+        """Return the key of the random stream for a purpose."""
         return stream_key(self.seed, self.path, purpose)
 
     def breakpoints(self, route: I64, begin_us: int, heading: int) -> I64:
-        """Return the breakpoints of its drive on a route (n, 2), after its beginning.
+        """Return the breakpoints of the drive on a route (n, 2), without the first.
 
         Returns:
             Time [us], x, y [lattice], heading [1/4096 turn], away; int64 (m, 5).
@@ -543,7 +544,7 @@ class Body:
         return rows
 
     def seconds(self, metres: F64) -> F64:
-        """Return its estimates of the time for ways of some lengths, without turns [s]."""
+        """Return estimates of the time for ways of some lengths, without turns [s]."""
         lattice = self.home.lattice
         if self.drive is None:
             return metres * lattice.units_per_m / self.speed
@@ -554,7 +555,7 @@ class Body:
         return blame(f"{self.path}.drive", None if self._bodies is None else self._bodies.step)
 
     def reachable_rooms(self) -> list[Room]:
-        """Return the rooms in which it can stand, in index order."""
+        """Return the rooms in which the body can stand, in index order."""
         space = self.space
         reached = space.rooms_of(self.part)
         return [room for room in self.home.rooms if room.index in reached]
@@ -566,7 +567,7 @@ class Body:
             PlacementError: No name is that of a room that can be reached.
         """
         thing = furniture_of(self, names)
-        at = None if thing is None else self.place_at(thing, 0).approach  # from where it is used
+        at = None if thing is None else self.place_at(thing, 0).approach  # where one uses it
         room = None if at is None else self.home.plan.room_of_point(*at)
         return self._match(names)[1] if room is None else [self.home.rooms[room.index]]
 
@@ -606,7 +607,7 @@ class Body:
         return self.home.lattice.cell_centre(row, column)
 
     def find_anywhere(self, place: Any, time_us: int) -> LatticePoint:
-        """Return the lattice point of a place to put the body at; no way has to lead there.
+        """Return the lattice point of a place to put the body at, even one without a way.
 
         Raises:
             PlacementError: There is no such room, or the body fits nowhere in it.
@@ -661,7 +662,7 @@ class Body:
         raise self._is_not_free(xy, self.space.nearest(x, y, self.part), why)
 
     def _is_not_free(self, xy: Point, near: LatticePoint | None, why: str = "") -> PlacementError:
-        """Return the error about a point; it names the nearest free one, in few decimals."""
+        """Return the error about a point, which names the nearest free one, in few decimals."""
         why = why or f"is in a wall or nearer to one than its radius of {self.entity.radius:g} m"
         lattice = self.home.lattice
         free = None

@@ -1,4 +1,4 @@
-"""Decisions: which plan a body follows next, chosen among its behaviors, orders and giving way.
+"""Decisions: the choice of the plan that a body follows next.
 
 Behaviors are in order of priority, the highest first. When a body's plan is over or interrupted, it
 asks them in turn, and follows the first plan that one returns. While it follows the plan of one,
@@ -7,7 +7,7 @@ time that they named, or at an event that they listen for. If none of them retur
 present plan goes on as if they had not been asked.
 
 An order decides in place of the behaviors, until the body is released. A body has one order at a
-time. Nothing interrupts it, but a robot still gives way and its battery still runs down. An order
+time. Nothing interrupts an order, but a robot still gives way and its battery still runs down. It
 ends after its duration, with the next order, or on release.
 """
 
@@ -47,9 +47,9 @@ class Arbiter:
     """Asks the behaviors of one body.
 
     Attributes:
-        active: The number of the behavior whose plan is followed; None: of no behavior.
-        wake_step: The step at which those before it are asked, though the plan isn't over.
-        own: The events that interrupt the present plan by its own request.
+        active: The number of the behavior whose plan is followed; None: none.
+        wake_step: The step at which earlier behaviors are asked during the plan.
+        own: The events by which the present plan asks to be interrupted.
         off: The numbers of the behaviors that are switched off.
     """
 
@@ -57,15 +57,15 @@ class Arbiter:
         self.behaviors = behaviors
         self.active: int | None = None
         self.wake_step: int | None = None
-        self._cool_at: dict[int, datetime] = {}  # when the cooldown of each is over
-        # By behavior: from when until when its hours hold, or don't.
+        self._cool_at: dict[int, datetime] = {}  # end of each cooldown
+        # The present time in which the hours hold or don't, by behavior.
         self._hours: dict[int, tuple[datetime, datetime, bool]] = {}
-        # By behavior: the plan to resume, the step of its interruption, its own interrupts, and the
-        # rooms that the body kept out of.
+        # The plan to resume by behavior, with the step of its interruption, its own interrupts, and
+        # the rooms that the body kept out of.
         self._interrupted: dict[int, tuple[Plan, int, frozenset[str], frozenset[int]]] = {}
         self.own: frozenset[str] = frozenset()
         self.off: frozenset[int] = frozenset()
-        # Events at which only behaviors before the active one are asked.
+        # Only behaviors before the active one are asked at these events.
         self._preempting_events: frozenset[str] = frozenset()
 
     def keeps_plan(self, now: Situation, plan: Plan, ask: Ask) -> bool | Plan:
@@ -95,7 +95,7 @@ class Arbiter:
         return True
 
     def asks_first(self, now: Situation, plan: Plan) -> bool:
-        """Return whether the first behavior would be asked, as `keeps_plan` and `choose` do it."""
+        """Return whether `keeps_plan` or `choose` would ask the first behavior."""
         goes_on = self.active == 0 and not plan.is_over(now.step) and not now.events
         return self._may_decide(0, now) and not (goes_on and self.wake_step == now.step)
 
@@ -115,7 +115,7 @@ class Arbiter:
         return None
 
     def watch(self, now: Situation, plan: Plan, *, fresh: bool) -> None:
-        """Set when, and at which events, behaviors before the active one are asked.
+        """Set the times and events at which behaviors before the active one are asked.
 
         Args:
             now: The situation.
@@ -161,7 +161,7 @@ class Arbiter:
         return self._opens_at(number, now) is None
 
     def _opens_at(self, number: int, now: Situation) -> datetime | None:
-        """Return when a behavior may be asked next; None: now."""
+        """Return the time at which a behavior may be asked next; None: now."""
         when = self.behaviors[number].when
         time = now.time
         cool = self._cool_at.get(number)
@@ -174,7 +174,7 @@ class Arbiter:
         return time if time > now.time else None
 
     def _hours_of(self, number: int, time: datetime) -> tuple[datetime, bool]:
-        """Return until when the hours of a behavior hold, or don't, and whether they do."""
+        """Return whether the hours of a behavior hold, after the time of the next change."""
         since, until, holds_now = self._hours.get(number, (time, time, False))
         if not since <= time < until:
             when = self.behaviors[number].when
@@ -213,7 +213,7 @@ class Arbiter:
             return None
         interrupted, step, interrupts, kept_out = self._interrupted.pop(number)
         if kept_out != now.actor.kept_out:
-            return None  # its way may lead through a room that the body keeps out of now
+            return None  # the way may lead through a room that is forbidden now
         from fleet2d.entities.giving_way import resumed  # few runs need it
 
         plan = resumed(now.plan(), interrupted, step)
@@ -226,7 +226,7 @@ class Order(Protocol):
     """Base of orders, which decide in place of a body's behaviors."""
 
     def decide(self, now: Situation) -> Plan | None:
-        """Return what to do from now on; None: it is over."""
+        """Return the plan from now on; None: the order is over."""
 
 
 @dataclass
@@ -234,7 +234,7 @@ class StandStill:
     """Stand still, wherever it is.
 
     Attributes:
-        duration: For how long; None: for good.
+        duration: Its duration; None: for good.
         posture: Its posture; None: as before.
     """
 
@@ -258,7 +258,7 @@ class Trip:
     """Go somewhere and stay there: the base of orders that move the body.
 
     Attributes:
-        duration: For how long it stays once it is there; None: for good.
+        duration: Time of staying there; None: for good.
     """
 
     duration: timedelta | None = field(default=None, kw_only=True)
@@ -266,7 +266,7 @@ class Trip:
     _goal: tuple[int, int, int] | None = field(default=None, init=False)  # x, y, away
 
     def decide(self, now: Situation) -> Plan | None:
-        """Go there, unless it is there already, and stay for the rest of the time."""
+        """Go there, unless already there, and stay for the rest of the time."""
         plan = now.plan()
         if self._goal != (plan.x, plan.y, plan.away):
             self.go(now, plan)
@@ -277,7 +277,7 @@ class Trip:
         return plan.stay(until=self._until)
 
     def has_reached(self, pose: Pose) -> bool:
-        """Return whether a pose is where it leads, as far as it is planned."""
+        """Return whether a pose is at the planned end of the trip."""
         return self._goal == (pose.x, pose.y, pose.away)
 
     def go(self, now: Situation, plan: Plan) -> None:
@@ -291,7 +291,7 @@ class GoTo(Trip):
 
     Attributes:
         place: A room, furniture, or a point [m].
-        heading: Where it faces on arrival [1/4096 turn]; None: as on its last leg.
+        heading: Heading on arrival [1/4096 turn]; None: as on the last leg.
     """
 
     place: RoomChoice | Point
@@ -306,17 +306,17 @@ class GoTo(Trip):
 
 @dataclass
 class LeaveRoom:
-    """Leave a room that it was told to keep out of, for the nearest one that is allowed.
+    """Leave a banned room for the nearest allowed one.
 
     Attributes:
-        about: What it was told, for the events table.
+        about: The ban, for the events table.
     """
 
     about: str
     _has_tried: bool = False
 
     def decide(self, now: Situation) -> Plan | None:
-        """Go to the nearest room that it may be in and isn't shut in by bans; once."""
+        """Go to the nearest allowed room that bans don't enclose, once."""
         actor = now.actor
         banned = actor.banned(now.step)
         if self._has_tried or not lies_in(actor, actor.state.position, banned):
@@ -351,19 +351,19 @@ class DoActivity(Trip):
 
     Attributes:
         activity: The activity's name, for the events table.
-        place: Where to do it; None: where the body's own behavior does it.
+        place: The place; None: that of the body's own behavior.
     """
 
     activity: str
     place: RoomChoice | Point | None
 
     def decide(self, now: Situation) -> Plan | None:
-        """Do it; it is over if the behavior that did it has changed and does it no more."""
+        """Do the activity; the order is over if no behavior does it any more."""
         is_possible = self.place is not None or self._performer(now) is not None
         return super().decide(now) if is_possible else None
 
     def go(self, now: Situation, plan: Plan) -> None:
-        """Go to where it is done, and begin."""
+        """Go to the place of the activity, and begin."""
         performer = self._performer(now)
         if self.place is not None:
             plan.come_home().go_to(self.place, "send")
@@ -376,7 +376,7 @@ class DoActivity(Trip):
         return next(capable, None)
 
 
-# Without a plan from any behavior, stand still this long, then ask again.
+# Without a plan from any behavior, a body stands still this long before they are asked again.
 PAUSE = timedelta(minutes=1)
 
 
@@ -389,8 +389,8 @@ class DecidingActor(Actor):
         order: The order that decides in place of its behaviors; None: there is none.
         waiting: Its wait, if it has stopped in front of a person.
         is_stuck: Whether it can't move, whatever its behaviors or an order want.
-        off_at: Where it was when it was off last.
-        is_displaced: Whether it was ever put somewhere: it may be where no way leads out.
+        off_at: Its pose when it was off last.
+        is_displaced: Whether it was ever put somewhere, so that no way may lead out.
         passes_until: Before that step it goes round people, and may come near without touching.
     """
 
@@ -401,19 +401,19 @@ class DecidingActor(Actor):
         self.is_stuck = self.is_displaced = False
         self.off_at = self.state
         self.passes_until = 0
-        self._chosen: Plan | None = None  # by `choose` or `keeps_plan`, for the next `decide`
+        self._chosen: Plan | None = None  # set by `choose` or `keeps_plan` for the next `decide`
         self.waiting: WaitForPeople | None = None
-        self._waited = (0, -1)  # since when it last waited, and up to which step that counts
-        self._no_way_round: object = None  # where no way round people was found, and for what
-        self._blocked = ("", -1)  # what was in its way, and up to which step it waits there
+        self._waited = (0, -1)  # beginning of the last wait, and the step up to which it counts
+        self._no_way_round: object = None  # situation without a way round people
+        self._blocked = ("", -1)  # obstacle, and the step up to which it waits there
 
     @property
     def is_immobile(self) -> bool:
-        """Whether it can't move at present: a fault, or an empty battery."""
+        """Whether a fault or an empty battery keeps it from moving at present."""
         return self.is_stuck or (self.charge is not None and self.charge.is_empty)
 
     def choose(self, plan: Plan) -> None:
-        """Set the plan that its next decision, which is due now, results in."""
+        """Set the plan of the decision that is due now."""
         self._chosen = plan
         self.waiting = None
         self.order = None
@@ -427,42 +427,42 @@ class DecidingActor(Actor):
         self.decide_again(step)
 
     def put(self, pose: Pose, step: int) -> None:
-        """Move to a pose at a step, and replan there: a plan from elsewhere is void."""
+        """Move to a pose at a step, and replan there, since the present plan is void."""
         self.state = pose
         self._chosen = None
         self.waiting = None
         self.is_displaced = True
         banned = self.banned(step)
         if not self.state.away and self._is_in(banned):
-            self.kept_out = frozenset()  # its way out may lead through others of them, too
+            self.kept_out = frozenset()  # the way out may lead through other forbidden rooms
             self.order = LeaveRoom("keep_out")
         self.part = self._present_part()
         self.decide_again(step)
 
     def decide_again(self, step: int) -> None:
-        """Ask all its behaviors at a step, even if its plan isn't over."""
+        """Ask all behaviors at a step, even if the plan isn't over."""
         self.ask(step)
         self.arbiter.wake_step = None
 
     def keep_out(self, room: int, step: int, until: int, about: str) -> None:
-        """Keep out of a room from a step on; in the room, it leaves first.
+        """Keep out of a room from a step on, after leaving it if inside.
 
         Args:
             room: The index of the room.
             step: The step.
             until: The first step at which it may enter again.
-            about: What it was told, for the events table.
+            about: The ban, for the events table.
         """
         self.bans = {**self.bans, room: max(until, self.bans.get(room, 0))}
         is_here = not self.state.away and self._is_in(frozenset({room}))
         self.follow_order(LeaveRoom(about) if is_here else self.order, step)
 
     def _is_in(self, zones: frozenset[int]) -> bool:
-        """Return whether it is in one of some rooms, by index, or areas."""
+        """Return whether the body is in one of some rooms, by index, or areas."""
         return lies_in(self, self.state.position, zones)
 
     def _heeds_rules(self, now: Situation) -> bool:
-        """Take in which of its rules of keeping out hold; return whether that has changed."""
+        """Update the rules of keeping out that hold; return whether they have changed."""
         ruled = self.rules_at(now.time)
         if ruled == self.ruled:
             return False
@@ -486,8 +486,8 @@ class DecidingActor(Actor):
     def receive(self, command: Command, step: int) -> bool:
         """Keep a command until a behavior takes it up; return whether one is asked at once.
 
-        A behavior that comes after the active one has to wait for its turn; nobody hears a command
-        while off.
+        A behavior after the active one has to wait for its turn; a body that is off hears no
+        command.
         """
         if self.is_off:
             return False
@@ -501,17 +501,17 @@ class DecidingActor(Actor):
         return now
 
     def dismiss(self, step: int) -> None:
-        """Forget what it was called to do, and replan."""
+        """Drop the command, and replan."""
         self.command = None
         for behavior in self.behaviors:
             behavior.dismiss()
         self.decide_again(step)
 
     def reboot(self, step: int) -> None:
-        """Begin anew after having been off: what its behaviors were in the middle of is lost."""
+        """Begin anew after having been off, without the present tasks of the behaviors."""
         off = self.arbiter.off
         for number in range(len(self.behaviors)):
-            with suppress(InputError):  # the home may lack by now what it needs to begin
+            with suppress(InputError):  # the home may have changed so that it can't begin
                 self.replace(number, self._declared[number])
         self.arbiter = Arbiter(self.behaviors)
         self.arbiter.off = off
@@ -522,13 +522,13 @@ class DecidingActor(Actor):
         self.follow_order(None, step)
 
     def reacts_to(self, event: SightEvent, step: int) -> bool:
-        """Return whether it reacts to an action of a robot."""
+        """Return whether the body reacts to an action of a robot."""
         if self.order is not None:
             return False
         return self._attentive is not None and self._attentive[0].reacts_to(self, event, step)
 
     def keeps_plan(self, now: Situation) -> bool:
-        """Return whether its plan goes on at a step at which behaviors want to be asked.
+        """Return whether the plan goes on at a step at which behaviors want to be asked.
 
         If one of them returns another plan, `decide` takes that.
         """
@@ -536,7 +536,7 @@ class DecidingActor(Actor):
             return False
         if self.rules is not None and self._heeds_rules(now):
             return False
-        # Bans hold for its ways once it is outside of those rooms.
+        # Once outside of banned rooms, ways avoid them.
         if self.bans or self.ruled or self.kept_out != self.forbidden:
             banned = self.banned(now.step)
             if banned != self.kept_out and not self._is_in(banned):
@@ -554,9 +554,9 @@ class DecidingActor(Actor):
         return False
 
     def asks_first(self, now: Situation) -> bool:
-        """Return whether a decision at this step, which is due, asks its first behavior for a plan.
+        """Return whether the due decision asks the first behavior for a plan.
 
-        Nothing changes by the question.
+        The question changes nothing.
         """
         if self.is_stuck or self._chosen is not None or self._runs_down(now):
             return False
@@ -566,7 +566,7 @@ class DecidingActor(Actor):
         return self._is_order_over(now) and self.arbiter.asks_first(now, self.plan)
 
     def _is_order_over(self, now: Situation) -> bool:
-        """Return whether it has no order, or one that has nothing left to do; nothing changes."""
+        """Return whether there is no order, or one that is over; nothing changes."""
         if self.order is None:
             return True
         try:
@@ -609,7 +609,7 @@ class DecidingActor(Actor):
             self._set_next_decision(now, fresh=True)
 
     def reason(self) -> tuple[str, str]:
-        """Return what its plan comes from, a behavior or `order`, and the last note of the plan."""
+        """Return the source of the plan, a behavior or `order`, and its last note."""
         if self.off_for is not None:
             return "off", self.off_for
         active = self.arbiter.active
@@ -632,7 +632,7 @@ class DecidingActor(Actor):
         Args:
             now: The situation.
             person: The name of the person.
-            surroundings: Where people are.
+            surroundings: The places of people.
         """
         from fleet2d.entities.giving_way import WaitForPeople
 
@@ -668,7 +668,7 @@ class DecidingActor(Actor):
         step = now.step
         now_us = step * self.clock.step_us
         self._runs_down(now)
-        if self.plan.began[0] == step:  # its first rows happened, though it ends at once
+        if self.plan.began[0] == step:  # its first rows have happened, though it ends at once
             plan.notes[:0] = [n for n in self.plan.notes if n.time_us <= now_us]
         self._follow(plan, step)
         self._set_next_decision(now, fresh=True)
@@ -679,7 +679,7 @@ class DecidingActor(Actor):
         self.planned_at = step
 
     def _set_next_decision(self, now: Situation, *, fresh: bool) -> None:
-        """Set when it decides next: the plan is over, or another behavior may interrupt it."""
+        """Set the next decision, at the end of the plan or when a behavior may interrupt it."""
         if self.is_off or (self.charge is not None and self.charge.is_empty):
             self.ask(self._wakes_at(now))
             return
@@ -699,7 +699,7 @@ class DecidingActor(Actor):
         self.ask(min(steps, default=None))
 
     def _wakes_at(self, now: Situation) -> int | None:
-        """Return when its battery, which was empty, lets it be on again; None: never."""
+        """Return the step at which an empty battery is charged enough to be on; None: never."""
         if self.charge is None or self.off_for not in (None, EMPTY):
             return None
         wakes_after_us = self.charge.wakes_after(self.motion)
@@ -711,8 +711,8 @@ class DecidingActor(Actor):
     def _ask_behavior(self, behavior: Behavior | Order, now: Situation) -> Plan | None:
         """Return the plan of a behavior or an order.
 
-        Where a place can't be reached because the home has changed, or the body was put elsewhere,
-        it is a plan to wait: the way may open again.
+        If a place can't be reached because the home has changed or the body was put elsewhere, the
+        plan is to wait, since the way may open again.
         """
         try:
             return behavior.decide(now)
@@ -721,7 +721,7 @@ class DecidingActor(Actor):
                 raise
             plan = now.plan()
             reason = str(error)
-            if self._blocked != (reason, now.step):  # else the row was written before the wait
+            if self._blocked != (reason, now.step):  # the row is written once per wait
                 plan.note(EventKind.WAY_BLOCKED, reason)
             plan.stay(DOOR_WAIT)
             self._blocked = reason, self.clock.step_at_or_after(plan.time_us)

@@ -1,4 +1,4 @@
-"""Drives: when a robot is where on its route, and which way it faces."""
+"""Drives: the position and heading of a robot on its route over time."""
 
 import math
 from abc import abstractmethod
@@ -12,9 +12,9 @@ from fleet2d.configuration.components import Component
 from fleet2d.errors import ComponentError
 from fleet2d.kernels import F64, I64, TURN, heading_of, turn_between
 
-# The longest time for a route [s]: ten days, so that poses on it can be interpolated in 64 bits.
+# A route takes at most ten days, so that its poses can be interpolated in 64 bits [s].
 MAX_DURATION_S = 864_000
-# A moment this near to a corner of the route is at the corner [m].
+# A moment this near to a corner of the route counts as at the corner [m].
 NEAR_M = 1e-6
 
 
@@ -37,7 +37,7 @@ class Route(NamedTuple):
         legs: Its straight pieces, in order.
         heading: The heading of the robot at its beginning [1/4096 turn].
         speed: The speed of the robot [m/s].
-        turn_rate: How fast the robot turns on the spot [1/4096 turn per second].
+        turn_rate: Rate of turning on the spot [1/4096 turn per second].
     """
 
     legs: tuple[Leg, ...]
@@ -47,12 +47,12 @@ class Route(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """Where on its route a robot is at a moment.
+    """The position of a robot on its route at a moment.
 
     Attributes:
         seconds: Time since the beginning of the route [s].
-        metres: How far along the route it is [m].
-        heading: Its heading [1/4096 turn].
+        metres: Distance along the route [m].
+        heading: Heading of the robot [1/4096 turn].
     """
 
     seconds: float
@@ -61,7 +61,7 @@ class Moment(NamedTuple):
 
 
 class Drive(Component):
-    """How a robot moves along its routes.
+    """The motion of a robot along its routes.
 
     A route is a row of straight legs, along which the body touches nothing. A drive has neither
     chance nor memory: the same route takes the same time again, in every run.
@@ -79,11 +79,11 @@ class Drive(Component):
 
     @abstractmethod
     def moments(self, route: Route) -> Iterable[Moment]:
-        """Return where the robot is whenever its speed or its turning changes, in order of time.
+        """Return the moments at which the speed or rate of turning changes, in order.
 
-        Between two moments it drives, and turns the shorter way, at constant rates. It begins at
-        0 s, at the beginning of the route, and has to be at its end at the last moment. Of two
-        moments, the later one is as far along the route or farther.
+        Between two moments the robot drives, and turns the shorter way, at constant rates. It
+        begins at 0 s, at the beginning of the route, and has to be at the end at the last moment.
+        It never goes back along the route.
         """
 
     def seconds(self, metres: F64, speed: float) -> F64:
@@ -144,7 +144,7 @@ def breakpoints(
     route = Route(tuple(legs), heading, rates[0] / units_per_m, rates[1])
     for moment in _checked(drive, route, ends[-1]) if legs else ():
         while moment.metres > ends[leg + 1] + NEAR_M:
-            if last.metres < ends[leg + 1] - NEAR_M:  # it passes a corner without a moment there
+            if last.metres < ends[leg + 1] - NEAR_M:  # the drive gave no moment at this corner
                 rows.append(row(_between(last, moment, ends[leg + 1]), leg))
             leg += 1
         rows.append(row(moment, leg))
@@ -161,7 +161,7 @@ def estimate(drive: Drive, metres: F64, speed: float) -> F64:
         speed: The speed of the robot [m/s].
 
     Raises:
-        ComponentError: They are not as many times of 0 or more.
+        ComponentError: The estimates are not as many times of 0 or more.
     """
     seconds = np.asarray(drive.seconds(metres, speed), np.float64)
     if seconds.shape != metres.shape or not (seconds >= 0).all():
@@ -176,7 +176,7 @@ def _checked(drive: Drive, route: Route, length: float) -> Iterator[Moment]:
     """Yield the moments of a drive on a route of a length [m].
 
     Raises:
-        ComponentError: They are not in order, or don't lead to the end.
+        ComponentError: The moments are not in order, or don't lead to the end.
     """
     last = Moment(0.0, 0.0, route.heading)
     for seconds, metres, heading in drive.moments(route):

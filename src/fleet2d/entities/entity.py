@@ -1,4 +1,4 @@
-"""Users and robots as a scenario has them, and what robots perceive without simulated sight."""
+"""Users and robots in a scenario, and sources of perceptions without simulated sight."""
 
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
@@ -29,17 +29,17 @@ SIGHTING = len(Column)
 
 
 class EvidenceSource(Component):
-    """Base of what a robot perceives in place of what its cameras would see.
+    """Base of sources of perceptions in place of simulated sightings.
 
     A source returns sightings as the sight kernel does, int64 (n, len(SightingColumn)) by step,
     with UNKNOWN_TRUTH for the true user. What the robot watched still follows from its poses and
     cameras.
 
     Attributes:
-        besides_cameras: Whether this comes in addition to what its cameras see, as false positives
-            that are known in advance do; else in place of it.
+        besides_cameras: Whether the sightings come in addition to those of the cameras, like known
+            false positives; else in their place.
 
-    After `start` it has `notes`, lines about its log: what was left out, and what doesn't fit.
+    After `start` it has `notes`, lines about its log: omissions and misfits.
     """
 
     kind = "evidence_source"
@@ -52,7 +52,7 @@ class EvidenceSource(Component):
         return getattr(self, "relative_to", "map") == "robot"
 
     def files(self) -> Sequence[Path]:
-        """Return the files that it reads."""
+        """Return the files to read."""
         return ()
 
     def start(self, actor: Actor, users: Sequence[str]) -> None:
@@ -65,7 +65,7 @@ class EvidenceSource(Component):
 
 
 class LiveDetections(EvidenceSource):
-    """Perceive what arrives while the run goes on, from a real robot or another program.
+    """Perceive detections that arrive during the run, from a real robot or another program.
 
     Each arrival is an intervention `perceive`, which `fleet2d live` or a script of your own makes,
     so that the run is repeated by its manifest.
@@ -97,7 +97,7 @@ class LiveDetections(EvidenceSource):
 
 
 class Entity(BodySettings):
-    """A body in the home, and what decides where it goes.
+    """A body in the home, and the behaviors that decide where it goes.
 
     Short form in a scenario: ``ana: {type: schedule, radius: 0.2, days: […]}`` gives the body one
     behavior, of that type, with all keys that aren't the body's own.
@@ -116,7 +116,7 @@ class User(Entity):
     Attributes:
         opens_doors: Opens doors in the way; else a shut door is a wall to it.
         camera: The user's field of view; with it, robots that come into view are events.
-        answers: How the person answers robots that want something; null: as most people do.
+        answers: The person's answers to requests of robots; null: those of most people.
         lights: Hours in which the person has the light on where it is awake, and switches it off on
             leaving; `dark`: from sunset to sunrise; left out: it leaves lights alone.
     """
@@ -137,7 +137,7 @@ class User(Entity):
 
     @property
     def tall(self) -> float:
-        """Its height, standing [m]: unless the scenario says it, by what it does."""
+        """The standing height [m]; by default, that of its behaviors."""
         usual = (behavior.usual_height for behavior in self.behaviors)
         return min(usual, default=self.usual_height) if self.height is None else self.height
 
@@ -152,8 +152,8 @@ class GivesWay(Settings):
 
     Attributes:
         distance: Gap between the bodies below which it doesn't drive nearer [m].
-        patience: How long it waits before it goes round, by 0.1 m where there is no more room.
-        gives_up: How long it waits where there is no way round before it skips the stop.
+        patience: Time of waiting before going round, by 0.1 m where there is no more room.
+        gives_up: Time of waiting without a way round before skipping the stop.
     """
 
     distance: Length = Field(default=0.4, ge=0, le=3)
@@ -171,17 +171,18 @@ class Robot(Entity):
         drive: How it moves along its routes.
         camera: Its only camera; null: it is blind, or has `cameras`.
         cameras: Several cameras, by name, in place of `camera`; their order doesn't matter.
-        perception: How its cameras err, unless they say so themselves; null: they don't.
-        perceives: What it perceives in place of what its cameras would see, or besides it, such as
-            a real robot's detections; null: what they see.
+        perception: The errors of cameras without errors of their own; null: none.
+        perceives: A source of sightings in place of its cameras, or besides them, such as a real
+            robot's detections; null: its cameras.
         battery: Its battery, for the behavior dock; null: its charge never ends.
-        gives_way: How it keeps clear of people; null: it drives on, and people go round it.
+        gives_way: The way in which it keeps clear of people; null: it drives on, and people go
+            round it.
         localization: The error of its estimate of its own pose; null: there is none.
-        power: When it crashes or updates, and what it forgets while it is off; null: never, and
-            nothing that it has learned.
-        keep_out: Rooms, kinds of rooms if the home has them, and areas out of which it keeps, at
-            all times, at hours or while somebody sleeps: it starts, stops, passes and follows
-            nowhere there. Put there by a person, it leaves.
+        power: Its crashes and updates, and the memory that outlasts them; null: no crashes, and all
+            that it has learned.
+        keep_out: Rooms, kinds of rooms if the home has them, and areas to keep out of, at all
+            times, at hours or while somebody sleeps: it starts, stops, passes and follows nowhere
+            there. If a person puts it there, it leaves.
         climbs: Whether it climbs stairs and takes lifts, as people do.
     """
 
