@@ -13,7 +13,7 @@ from typing import Any
 
 from mcp import Client
 
-from fleet2d.live.assistant import server
+from fleet2d.live.mcp_server import server
 
 HOME = """extends: bundled:paper
 simulation: {duration: 1 d}

@@ -430,24 +430,24 @@ CHILD = [
 ASSISTANT = [
     Defence(
         "an assistant is kept in its folder",
-        "live.assistant",
+        "live.mcp_server",
         "with place.lock, within(place.folder), running_code(allowed=False):",
         "with place.lock, running_code(allowed=False):",
-        "live/test_assistant.py::test_nothing_outside_is_quoted_in_a_message",
+        "live/test_mcp_server.py::test_nothing_outside_is_quoted_in_a_message",
     ),
     Defence(
         "its scenarios run no code",
-        "live.assistant",
+        "live.mcp_server",
         "with place.lock, within(place.folder), running_code(allowed=False):",
         "with place.lock, within(place.folder):",
-        "live/test_assistant.py::test_files_outside_and_code_are_refused",
+        "live/test_mcp_server.py::test_files_outside_and_code_are_refused",
     ),
     Defence(
         "its names stay in the folder",
-        "live.assistant",
+        "live.mcp_server",
         "if not path.is_relative_to(self.folder) or path == self.folder:",
         "if False:",
-        "live/test_assistant.py::test_paths_out_of_the_folder_are_refused",
+        "live/test_mcp_server.py::test_paths_out_of_the_folder_are_refused",
     ),
     Defence(
         "a query has listed functions only",

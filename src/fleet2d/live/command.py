@@ -1,4 +1,4 @@
-"""Commands for other programs: live, mcp."""
+"""The commands `fleet2d live` and `fleet2d mcp`."""
 
 import json
 import os
@@ -65,7 +65,7 @@ def live(
 
     scenario, overrides = split(arguments)
     changes = overrides if seed is None else [*overrides, f"simulation.seed={seed}"]
-    with libraries_told(id):  # before and after the run: not told
+    with libraries_told(id):  # before and after the run, errors of libraries are dropped
         checked = load_scenario(scenario, *changes)
         opened = open_peers(checked, *peers or ())
         if not opened:
@@ -105,7 +105,7 @@ def mcp(
     Examples:
       fleet2d mcp experiments
     """
-    from fleet2d.live.assistant import server
+    from fleet2d.live.mcp_server import server
 
     app = server(folder)
     os.chdir(folder)  # where relative paths in overrides and interventions start

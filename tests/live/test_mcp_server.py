@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from fleet2d.errors import Fleet2DError, InputError
-from fleet2d.live import assistant
-from fleet2d.live.assistant import Workspace, server
+from fleet2d.live import mcp_server
+from fleet2d.live.mcp_server import Workspace, server
 from fleet2d.scenario import schema
 
 HOME = "extends: bundled:paper\nsimulation: {duration: 3 h, start: 2026-01-05T07:00}\n"
@@ -233,14 +233,14 @@ def test_a_run_at_the_pace_of_a_clock_is_refused(place):
 @pytest.mark.slow
 def test_a_call_simulates_for_a_limited_time(place, monkeypatch):
     name = place.begin("home.yaml", ["simulation.duration=5000 d"])
-    monkeypatch.setattr(assistant, "MAX_S", 0.3)
+    monkeypatch.setattr(mcp_server, "MAX_S", 0.3)
 
     with pytest.raises(InputError, match=r"simulates for 0\.3 s at most.*: ask for a shorter"):
         place.run("home.yaml", "first", ["simulation.duration=5000 d"])
     assert place.ask("first", "events")["rows"] > 0
     with pytest.raises(InputError, match=r"0\.3 s at most, which ended at .*the state is kept"):
         place.advance(name, "4000 d")
-    monkeypatch.setattr(assistant, "MAX_S", 60)
+    monkeypatch.setattr(mcp_server, "MAX_S", 60)
     assert place.advance(name, "1 min")["state"]["ana"]
 
 
@@ -253,8 +253,8 @@ def busy(*_, **__):
 
 @pytest.mark.parametrize("slow", ["load_scenario", "open_run"])
 def test_all_that_a_call_does_has_a_limited_time(place, monkeypatch, slow):
-    monkeypatch.setattr(assistant, "MAX_CALL_S", 0.3)
-    monkeypatch.setattr(assistant, slow, busy)
+    monkeypatch.setattr(mcp_server, "MAX_CALL_S", 0.3)
+    monkeypatch.setattr(mcp_server, slow, busy)
     use = place.check if slow == "load_scenario" else place.picture
 
     begin = time.monotonic()
@@ -266,9 +266,9 @@ def test_all_that_a_call_does_has_a_limited_time(place, monkeypatch, slow):
 
 def test_a_simulation_whose_metrics_take_too_long_is_gone(place, monkeypatch):
     name = place.begin("home.yaml")
-    monkeypatch.setattr(assistant, "MAX_CALL_S", 0.3)
+    monkeypatch.setattr(mcp_server, "MAX_CALL_S", 0.3)
     for step in ("advance", "finish"):
-        monkeypatch.setattr(assistant.Simulation, step, busy)
+        monkeypatch.setattr(mcp_server.Simulation, step, busy)
 
     with pytest.raises(InputError, match="one call takes"):
         place.advance(name, "1 min")
@@ -279,15 +279,15 @@ def test_a_simulation_whose_metrics_take_too_long_is_gone(place, monkeypatch):
 def test_components_are_listed_by_part_and_briefly(monkeypatch):
     described = schema.describe_components()
     monkeypatch.setattr(schema, "describe_components", lambda: described)  # which takes a while
-    kinds = [line.partition(":")[0] for line in assistant.list_components().splitlines()]
+    kinds = [line.partition(":")[0] for line in mcp_server.list_components().splitlines()]
 
-    assert len(assistant.list_components()) < 4000
-    assert all(len(assistant.list_components(kind)) < 4000 for kind in kinds)
-    assert "dwell" in assistant.list_components("behavior", "patrol")
+    assert len(mcp_server.list_components()) < 4000
+    assert all(len(mcp_server.list_components(kind)) < 4000 for kind in kinds)
+    assert "dwell" in mcp_server.list_components("behavior", "patrol")
     with pytest.raises(InputError, match="did you mean 'behavior'"):
-        assistant.list_components("behaviour")
+        mcp_server.list_components("behaviour")
     with pytest.raises(InputError, match="did you mean 'patrol'"):
-        assistant.list_components("behavior", "patroll")
+        mcp_server.list_components("behavior", "patroll")
 
 
 @pytest.mark.slow
