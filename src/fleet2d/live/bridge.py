@@ -1,7 +1,7 @@
-"""A run in real time, between other programs: what arrives is applied, what happens is passed on.
+"""A run in real time among other programs: messages are applied, and events passed on.
 
-What arrives becomes an intervention at the next step, so that the manifest repeats the run. What is
-late, lost, wrong or too much is counted and told, and never stops the run.
+A message becomes an intervention at the next step, so that the manifest repeats the run. Messages
+that are late, lost, wrong or too many are counted and told, and never stop the run.
 """
 
 import gc
@@ -44,30 +44,30 @@ from fleet2d.runs.run import Run
 from fleet2d.runtime.events import Event
 from fleet2d.scenario.model import Scenario
 
-# A wait ends so long before a step, and the rest is spent awake: a busy machine wakes late [s]. Of
-# short steps it is this share.
+# The last time before a step that is spent awake, as a busy machine wakes late [s], and its largest
+# share of a step.
 LEAD_S = 0.003
 LEAD_SHARE = 0.01
-# How long another thread may keep this one from going on [s]. Python's 5 ms are late for a step.
+# The longest time that another thread may block this one [s]: Python's 5 ms would delay steps.
 SWITCH_S = 0.0005
-# A body that gets poses stands when nothing arrived for so long [s].
+# The silence after which a body that gets poses stands [s].
 SILENCE_S = 5.0
-# A message that was sent longer ago is late, and left out [s].
+# The age from which a message is late, and left out [s].
 MAX_AGE_S = 2.0
-# A pose or detection farther than this from any place where it can be is left out [m].
+# The largest distance of a pose or detection from a possible place; farther ones are left out [m].
 REACH_M = 1.0
-# More messages than this in a step are left out.
+# The largest number of messages in a step; further ones are left out.
 MAX_PER_STEP = 1000
-# More messages than this, times the bound of a step, aren't even kept until then.
+# The number of steps whose bound of messages may wait; further ones aren't kept.
 MAX_WAITING_STEPS = 10
-# A body that refuses its last message of a step gets the one before, up to so many times.
+# How many earlier messages of a step a body may get, one by one, when it refuses the last.
 MAX_TRIED = 100
-# Of so many steps it is kept how late they began: a run may last for months.
+# The number of steps whose lateness is kept, as a run may last for months.
 MAX_LATENESS = 100_000
-# The number of reasons of one kind that are told.
+# The largest number of reasons of one kind that are told.
 MAX_TOLD = 20
 MAX_TEXT = 300
-# A pose that is farther from the one before it was not reached on foot or wheels [m, m/s].
+# The largest distance from pose to pose that feet or wheels can cover [m, m/s].
 JUMP_M = 1.0
 JUMP_M_PER_S = 5.0
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
@@ -75,12 +75,12 @@ _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 @dataclass(frozen=True)
 class LiveStep:
-    """What happened in a step.
+    """A step of a run, with its events.
 
     Attributes:
         step: The step.
         time: Its local time.
-        bodies: x, y [m], heading [rad], room and away of each body after it, by name.
+        bodies: x, y [m], heading [rad], room and away of each body after the step, by name.
         events: Its events, in order, readings of sensors among them.
         rows: Its rows of other tables: pairs of the name of the table and the row.
         goals: The goals that are under way, and those that have just begun or ended.
@@ -110,12 +110,12 @@ class LiveStep:
 
 
 class PeerFault(NamedTuple):
-    """What a peer noticed about what arrived, or about a client.
+    """A fault that a peer noticed, in a message or of a client.
 
     Attributes:
-        kind: What it is counted as, such as "wrong" or "slow clients".
-        text: What is wrong, on one line.
-        is_message: Whether it is instead of a message.
+        kind: The name under which it is counted, such as "wrong" or "slow clients".
+        text: A line that says what is wrong.
+        is_message: Whether it stands for a message.
     """
 
     kind: str
@@ -133,20 +133,20 @@ class Post(Protocol):
         """Receive a message.
 
         Args:
-            content: The message; None: the client is gone, and with it what it was heading for; a
-                fault is counted and told.
-            client: Which of several clients of a peer sent it: each counts its own messages.
+            content: The message; None: the client is gone, and its goals end; a fault is counted
+                and told.
+            client: The number of the client of a peer that sent it; each counts its own messages.
         """
 
 
 def lose(post: Post, address: str) -> None:
-    """Tell a run that a server is gone, and with it all that it was heading for."""
+    """Tell a run that a server is gone, which ends all its goals."""
     post(None)
     post(PeerFault("lost connections", f"{address}: the connection is tried again"))
 
 
 def missing(address: str, server: str) -> PeerFault:
-    """Return the fault of a server that isn't there when a run begins: maybe it comes later."""
+    """Return the fault of a server that isn't there yet when a run begins."""
     return PeerFault("lost connections", f"{address}: there is no {server} yet; it is tried again")
 
 
@@ -156,7 +156,7 @@ class Peer:
     Methods that a peer leaves out do nothing.
 
     Attributes:
-        fastest: More times real time than it can follow are told.
+        fastest: The largest speed [times real time] that it follows; a faster run is told.
     """
 
     fastest: float = math.inf
@@ -168,7 +168,7 @@ class Peer:
         """Pass on a step, without waiting."""
 
     def tell(self, text: str) -> None:
-        """Pass on a note about what arrived."""
+        """Pass on a note about messages."""
 
     def close(self, run: Run) -> None:
         """Disconnect, after the last step."""
@@ -209,16 +209,16 @@ class Bridge:
         simulation: The simulation; it runs as fast as `speed` says, whatever its own speedup.
         peers: The other programs; by their addresses, if the scenario names some as sources.
         speed: Times real time; 0: as fast as it can, for tests.
-        silence_s: A body that gets poses stands when none arrived for so long, which is told.
-        max_age_s: A message that was sent longer ago is left out.
-        max_per_step: More messages than this in a step are left out.
+        silence_s: The silence after which a body that gets poses stands [s], which is told.
+        max_age_s: The age from which a message is left out [s].
+        max_per_step: The largest number of messages in a step; further ones are left out.
         keeps_goals: Whether goals of a client that is gone stay; else they are withdrawn, and the
             body does what its behaviors decide: one of the type `live` stands.
         rows: Whether rows of tables are passed on, besides poses and events.
-        tell: Called with notes about what arrived.
-        counts: How many messages were received, applied, late, lost, wrong, replaced, too many; and
-            how often anything else was odd.
-        lateness_s: How late each of the last steps began, at most MAX_LATENESS of them.
+        tell: Called with notes about messages.
+        counts: The numbers of messages that were received, applied, late, lost, wrong, replaced or
+            too many, and of other faults.
+        lateness_s: The lateness of each of the last steps [s], at most MAX_LATENESS of them.
 
     Example:
         >>> from fleet2d.live import to_function
@@ -242,7 +242,7 @@ class Bridge:
     lateness_s: deque[float] = field(default_factory=lambda: deque(maxlen=MAX_LATENESS))
 
     def __post_init__(self) -> None:
-        """Begin with nothing heard.
+        """Check the sources; no message has arrived.
 
         Raises:
             InputError: The scenario names a source that isn't among the peers.
@@ -265,13 +265,13 @@ class Bridge:
         self._events: list[Event] = []
         self._rows: list[tuple[str, Mapping[str, Any]]] = []
         self._heard: dict[str, float] = {}  # when the last pose of each body arrived [s]
-        self._standing: set[str] = set()  # the bodies for which none has arrived for a while
+        self._standing: set[str] = set()  # the bodies without a recent pose
         self._numbers: dict[Sender, int] = {}
         self._told: Counter[str] = Counter()
         self._first: dict[tuple[str, str], str] = {}  # the first text of each kind and reason
-        self._reasons: Counter[tuple[str, str]] = Counter()  # how often, by kind and first text
-        self._times: dict[tuple[Sender, tuple[str, str]], float] = {}  # the last of each part
-        self._poses: dict[str, tuple[Sender, int, float, float]] = {}  # the last: step, x, y
+        self._reasons: Counter[tuple[str, str]] = Counter()  # counts by kind and first text
+        self._times: dict[tuple[Sender, tuple[str, str]], float] = {}  # the last time of each part
+        self._poses: dict[str, tuple[Sender, int, float, float]] = {}  # last step, x, y
         self._names = {*self.simulation.actors, *self.simulation.scenario.objects}
         self._later: dict[str, tuple[LiveMessage, Sender]] = {}  # readings for the next step
         self._is_stopping = False
@@ -305,11 +305,11 @@ class Bridge:
         return run
 
     def _hear(self, table: str, row: Mapping[str, Any]) -> None:
-        if table != "events":  # which are heard in order
+        if table != "events":  # events are heard in order
             self._rows.append((table, row))
 
     def notes(self) -> list[str]:
-        """Return lines about what arrived."""
+        """Return lines about the messages of the run."""
         words = [f"{self.counts[key]} {key}" for key in sorted(self.counts) if key != "received"]
         if not words:
             return []
@@ -348,15 +348,13 @@ class Bridge:
             if self._is_stopping:
                 return
             if self.speed:
-                gc.collect()  # now, and not when a step is due
+                gc.collect()  # so that it isn't due within a step
 
     def _stop(self) -> None:
         self._is_stopping = True
 
-    # What arrives
-
     def _received(self) -> list[tuple[LiveMessage | None, Sender]]:
-        """Return the messages for the present step with their senders; None: who is gone."""
+        """Return the messages for the present step with their senders; None: the sender is gone."""
         received: list[tuple[LiveMessage | None, Sender]] = []
         orders: set[tuple[str, str]] = set()
         others = 0
@@ -392,7 +390,7 @@ class Bridge:
     ) -> list[tuple[LiveMessage | None, Sender]]:
         """Return messages without readings that turn a sensor back within the step.
 
-        The last of these is left for the next step, so that a pulse shorter than a step is seen.
+        The last of these waits for the next step, so that a pulse shorter than a step is seen.
         """
         now: list[tuple[LiveMessage | None, Sender]] = []
         shown: dict[str, bool] = {}
@@ -472,7 +470,7 @@ class Bridge:
     def _last_of(
         self, received: Sequence[tuple[LiveMessage | None, Sender]]
     ) -> list[tuple[LiveMessage | None, Sender]]:
-        """Return what counts of a step: of each body the last of its poses, goals and velocities.
+        """Return the messages of a step that count: the last pose, goal and velocity of each body.
 
         A message that can't be applied replaces none.
         """
@@ -508,7 +506,7 @@ class Bridge:
         return counting[::-1]
 
     def _replace(self, message: LiveMessage, sender: Sender, later: Sender) -> None:
-        """Count a message instead of which a later one counts, and tell poses of two programs."""
+        """Count a message that a later one replaces, and tell if two programs send poses."""
         self.counts["replaced"] += 1
         if isinstance(message, GoalMessage):
             self._goals.refuse(message, sender, "another goal came at once")
@@ -575,16 +573,16 @@ class Bridge:
             )
 
     def _check_goal(self, message: LiveMessage) -> None:
-        """Refuse the end of a goal that a body hasn't by now."""
+        """Refuse to cancel a goal that a body doesn't have."""
         if isinstance(message, CancelMessage) and not self._goals.has(message.entity, message.id):
             name = f" {message.id!r}" if message.id else ""
             raise InputError(f"{message.entity} has no goal{name}")
 
     def _mended(self, message: LiveMessage) -> LiveMessage:
-        """Return a message with a pose that its body can have, and with detections in the home.
+        """Return a message with its pose or detections moved to possible places nearby.
 
         Raises:
-            InputError: The pose is farther than REACH_M from any such place.
+            InputError: The pose is farther than REACH_M from any possible place.
         """
         if isinstance(message, PoseMessage):
             actor = self.simulation.actors[message.entity]
@@ -623,7 +621,7 @@ class Bridge:
         return message
 
     def _stop_the_silent(self) -> None:
-        """Let bodies stand for which nothing has arrived for a while."""
+        """Let bodies stand whose poses have stopped."""
         now = time.monotonic()
         for name, heard in self._heard.items():
             if name not in self._standing and now - heard > self.silence_s:
@@ -633,7 +631,7 @@ class Bridge:
                 self.simulation.do({"hold": name})
 
     def _withdraw(self, sender: Sender) -> None:
-        """Let bodies decide again that go where a client sent them which is gone."""
+        """Let bodies decide again whose goals came from a client that is gone."""
         for goal in () if self.keeps_goals else self._goals.of(sender):
             name = goal.entity
             self._goals.cancel(name, "its sender is gone")
@@ -642,7 +640,7 @@ class Bridge:
             self.simulation.do({"release": name})
 
     def _count(self, kind: str, text: str, count: int = 1) -> None:
-        """Count what is odd, and tell it once for each reason: numbers in it make no other one."""
+        """Count a fault, and tell it once for each reason, whatever the numbers in it."""
         self.counts[kind] += count
         text = one_line(text, MAX_TEXT)
         reason = kind, _NUMBER.sub("0", text)
@@ -660,8 +658,6 @@ class Bridge:
             return
         for tell in (self.tell, *(peer.tell for peer in self._peers)):
             tell(text)
-
-    # What happens
 
     def _send(self) -> None:
         simulation = self.simulation
@@ -689,7 +685,7 @@ def _prompt_threads() -> Iterator[None]:
     was_enabled = gc.isenabled()
     sys.setswitchinterval(SWITCH_S)
     gc.collect()
-    gc.freeze()  # what is there stays to the end: looking through it takes 0.1 s
+    gc.freeze()  # a collection of existing objects would take 0.1 s
     gc.disable()
     try:
         yield
@@ -710,7 +706,7 @@ def _part_of(message: LiveMessage) -> tuple[str, str]:
 
 
 def _order_of(message: LiveMessage) -> tuple[str, str] | None:
-    """Return what says that only the last such message of a step counts: its type and body."""
+    """Return the type and body of a message if only the last such message of a step counts."""
     if isinstance(message, PoseMessage | GoalMessage | VelocityMessage):
         return message.type, message.entity
     return None

@@ -1,4 +1,4 @@
-"""Goals of bodies in a live run: what becomes of each, from its acceptance to its end.
+"""Goals of bodies in a live run, followed from their acceptance to their end.
 
 A body that has reached its goal stands there until it is released, as its order says.
 """
@@ -21,7 +21,7 @@ Sender = tuple[int, int]
 
 
 class GoalStatus(StrEnum):
-    """What has become of a goal so far."""
+    """The state of a goal."""
 
     ACCEPTED = "accepted"
     UNDER_WAY = "under_way"
@@ -38,10 +38,10 @@ class GoalState(NamedTuple):
         entity: The body.
         id: The name that its sender gave it.
         to: The place, as it was sent.
-        state: What has become of it.
+        state: Its state.
         detail: Why it is impossible, cancelled or blocked.
-        metres: The length of the way that is left, as it is planned.
-        seconds: The time that is left, as it is planned.
+        metres: The length of the rest of the planned way.
+        seconds: The time that the rest of the planned way takes.
         sender: Who sent it.
     """
 
@@ -70,8 +70,8 @@ class _Goal:
     message: GoalMessage
     sender: Sender
     order: GoTo | None = None
-    obstacle: str | None = None  # what blocks the way; None: nothing does
-    is_reached: bool = False  # and the body still stands there, by the order
+    obstacle: str | None = None  # the name of what blocks the way
+    is_reached: bool = False  # the body still stands there
 
     def state(
         self, state: GoalStatus, detail: str = "", metres: float = 0.0, seconds: float = 0.0
@@ -84,7 +84,7 @@ class Goals:
     """The goals of all bodies in a live run: each has one at a time."""
 
     def __init__(self, simulation: Simulation) -> None:
-        """Begin without any."""
+        """Begin without goals."""
         self._simulation = simulation
         self._goals: dict[str, _Goal] = {}
         self._news: list[GoalState] = []
@@ -107,19 +107,19 @@ class Goals:
             self._news.append(goal.state(GoalStatus.CANCELLED, reason))
 
     def has(self, entity: str, name: str = "") -> bool:
-        """Whether a body has a goal: of a name, if one is given."""
+        """Return whether a body has a goal, or the goal of a name."""
         goal = self._goals.get(entity)
         return goal is not None and name in ("", goal.message.id)
 
     def of(self, sender: Sender) -> list[GoalMessage]:
-        """Return the goals that somebody sent and that bodies follow, or stand at."""
+        """Return the goals of a sender that bodies follow or stand at."""
         return [goal.message for goal in self._goals.values() if goal.sender == sender]
 
     def take_news(self, events: Iterable[Event]) -> list[GoalState]:
-        """Return what became of the goals since the last call, at the present step.
+        """Return the states of goals under way, and of those that began or ended lately.
 
         Args:
-            events: The events since then.
+            events: The events since the last call.
         """
         blocked = {e.entity: e.detail for e in events if e.event == EventKind.WAY_BLOCKED}
         for entity, goal in list(self._goals.items()):
@@ -151,7 +151,7 @@ class Goals:
         return goal.state(GoalStatus.UNDER_WAY, "", metres, seconds)
 
     def _left(self, actor: DecidingActor) -> tuple[float, float]:
-        """Return the length [m] and the time [s] of what is left of the way in a plan."""
+        """Return the length [m] and the time [s] of the rest of a planned way."""
         clock = self._simulation.clock
         now_us = self._simulation.step * clock.step_us
         rows = actor.plan.legs.rows().tolist()

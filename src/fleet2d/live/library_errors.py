@@ -1,4 +1,4 @@
-"""Errors in libraries of peers and in threads: a line each, and no traceback on the terminal."""
+"""Errors in libraries of peers and in threads, as lines in place of tracebacks."""
 
 import logging
 import threading
@@ -33,7 +33,7 @@ def _described(error: BaseException) -> str:
 
 @contextmanager
 def libraries_told(tell: Callable[[str], object]) -> Iterator[None]:
-    """Tell what goes wrong within libraries, and in their threads.
+    """Tell errors within libraries and in their threads.
 
     Args:
         tell: Called with one line about each error, from any thread.

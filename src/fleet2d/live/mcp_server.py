@@ -1,4 +1,4 @@
-"""Assistants: Fleet2D by the Model Context Protocol, within one folder and nothing else.
+"""The server of the Model Context Protocol: AI assistants use Fleet2D within one folder.
 
 The tools write and check scenarios and personas, run them, ask their tables, draw pictures and
 intervene. Code of a scenario's own never runs, and no path leads out of the folder.
@@ -45,7 +45,7 @@ MAX_RUNNING = 8
 
 
 class _CallTooLong(KeyboardInterrupt):
-    """A call takes too long: what it does is interrupted as by Ctrl-C."""
+    """Raised in a call that takes too long, as Ctrl-C raises KeyboardInterrupt."""
 
 
 Method = TypeVar("Method", bound=Callable[..., Any])
@@ -54,7 +54,7 @@ Method = TypeVar("Method", bound=Callable[..., Any])
 def confined(method: Method) -> Method:
     """Run a method of a workspace within its folder, without a scenario's code, one at a time.
 
-    It is interrupted if it takes too long; a simulation that it names is gone then.
+    A call that takes too long is interrupted, and the simulation that it names is lost.
     """
 
     @functools.wraps(method)
@@ -87,7 +87,7 @@ def interrupted_after(seconds: float) -> Iterator[None]:
     finally:
         timer.cancel()
         timer.join()
-        interrupt(thread, None)  # one that is on its way would be raised after the block
+        interrupt(thread, None)  # a pending one would be raised after the block
 
 
 class Workspace:
@@ -120,7 +120,7 @@ class Workspace:
         """Return a path within the folder.
 
         Raises:
-            InputError: It leads out of the folder.
+            InputError: The path leads out of the folder.
         """
         if not name.isprintable() or len(name.encode()) > MAX_NAME:
             raise InputError(f"{one_line(repr(name), 100)} can't be the name of a file")
@@ -128,8 +128,6 @@ class Workspace:
         if not path.is_relative_to(self.folder) or path == self.folder:
             raise InputError(f"{name!r} leads out of the folder: give a name like 'home.yaml'")
         return path
-
-    # Files
 
     def files(self) -> list[str]:
         """Return the names of the files and runs in the folder."""
@@ -143,7 +141,7 @@ class Workspace:
         """Return the text of a file.
 
         Raises:
-            InputError: There is none, it is too large, or no text.
+            InputError: There is no such file, or it is too large or no text.
         """
         path = self.path(name)
         if not path.exists():
@@ -160,7 +158,7 @@ class Workspace:
         """Write a YAML file, such as a scenario or a persona.
 
         Raises:
-            InputError: It isn't a .yaml file of the folder itself, or too long.
+            InputError: The file isn't a .yaml file of the folder itself, or the text is too long.
         """
         path = self.path(name)
         if path.suffix not in (".yaml", ".yml", ".csv", ".json") or path.parent != self.folder:
@@ -175,14 +173,12 @@ class Workspace:
             write_atomically(path, content)
         return f"wrote {name}"
 
-    # Runs
-
     @confined
     def check(self, scenario: str) -> dict[str, Any]:
         """Check a scenario, with the places of all people and robots.
 
         Raises:
-            InputError: It is wrong; the message says where and what to do.
+            InputError: The scenario is wrong; the message says where and what to do.
         """
         simulation = self._simulation(scenario, [], None)
         plan = simulation.home.plan
@@ -302,7 +298,7 @@ class Workspace:
 
     @confined
     def manifest(self, run: str) -> str:
-        """Return what a run says of itself, as JSON: scenario, metrics, notes, digest.
+        """Return the manifest of a run as JSON: scenario, metrics, notes, digest.
 
         Raises:
             InputError: There is no such run.
@@ -316,7 +312,7 @@ class Workspace:
 
     @confined
     def picture(self, run: str) -> bytes:
-        """Return a PNG of the home and the ways of a run.
+        """Return a PNG of the home and the paths of a run.
 
         Raises:
             InputError: There is no such run.
@@ -327,8 +323,6 @@ class Workspace:
             target = Path(folder) / "run.png"
             draw_run(self._open(run), target)
             return target.read_bytes()
-
-    # Interventions
 
     @confined
     def begin(self, scenario: str, overrides: list[str] | None = None) -> str:
@@ -401,7 +395,7 @@ def limited(simulation: Simulation, advice: str) -> Iterator[None]:
     """Stop a simulation that takes too long.
 
     Raises:
-        InputError: It was stopped.
+        InputError: The simulation was stopped.
     """
     timer = threading.Timer(MAX_S, stop, [simulation])
     timer.start()
@@ -474,7 +468,7 @@ def server(folder: Path) -> Any:
     place = Workspace(folder)
 
     def picture(run: str) -> Image:
-        """Draw the home and the ways of a run."""
+        """Draw the home and the paths of a run."""
         return Image(data=place.picture(run), format="png")
 
     tools = (
@@ -483,7 +477,7 @@ def server(folder: Path) -> Any:
     )  # fmt: skip
 
     def told(tool: Callable[..., Any]) -> Callable[..., Any]:
-        """Let an assistant read what is wrong."""
+        """Return a tool whose errors an assistant can read."""
 
         @functools.wraps(tool)
         def answer(*args: Any, **settings: Any) -> Any:
@@ -495,7 +489,7 @@ def server(folder: Path) -> Any:
         return answer
 
     def strict(tool: Callable[..., Any]) -> Tool:
-        """Refuse arguments that the tool doesn't have: the SDK would ignore them."""
+        """Return a tool that refuses unknown arguments, which the SDK would ignore."""
         made = Tool.from_function(told(tool), name=tool.__name__.removeprefix("list_"))
         arguments = made.fn_metadata.arg_model
         arguments.model_config["extra"] = "forbid"

@@ -148,7 +148,7 @@ def message_schema() -> dict[str, Any]:
 
 
 def first_fault(error: ValidationError) -> str:
-    """Return the first of the faults of a message, with the place of it."""
+    """Return the first fault of a message, with its place."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])
     return f"{place}: {first['msg']}" if place else first["msg"]
@@ -158,7 +158,7 @@ def parse_message(content: str | bytes | Mapping[str, Any]) -> LiveMessage:
     """Read a message.
 
     Raises:
-        InputError: It isn't JSON, too long, or not such a message.
+        InputError: The content is no JSON, too long, or no such message.
 
     Example:
         >>> parse_message('{"type": "goal", "entity": "astro", "to": "kitchen"}').to

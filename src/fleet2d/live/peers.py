@@ -1,7 +1,7 @@
 """Other programs of a live run: Python functions, UDP, WebSocket, MQTT; any by its address.
 
-A network peer is written `scheme://host:port`. The run waits for none of them: one that is slow
-loses messages, one that is gone is left out.
+A network peer is written `scheme://host:port`. The run waits for no peer: a slow one loses
+messages, and one that is gone is left out.
 """
 
 import contextlib
@@ -33,9 +33,10 @@ from fleet2d.runs.run import Run
 from fleet2d.runtime.events import EventKind
 from fleet2d.scenario.model import Scenario
 
-# A client whose queue is longer is too slow, and is disconnected.
+# The length of a client's queue above which the client is disconnected as too slow.
 MAX_QUEUE = 10_000
-# Programs, and pages of this machine: any other page that is open in a browser could connect, too.
+# Programs have no origin; of pages, which any site could open in a browser, only those of this
+# machine are allowed.
 ORIGINS = [None, re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")]
 THIS_MACHINE = (None, "localhost", "127.0.0.1", "::1")
 VERSION = 1
@@ -50,9 +51,9 @@ DEVICE_CLASSES = {
 }
 """Home Assistant's class of each type of sensor."""
 WAIT_S = 5.0
-# So many programs that sent datagrams are told of goals.
+# The number of senders of datagrams that are told of goals.
 MAX_SENDERS = 16
-# Of more messages before a run, the last ones count; so many are kept for a broker that is gone.
+# The number of messages kept before a run, and for a broker that is gone.
 MAX_EARLY = 1000
 
 
@@ -64,7 +65,7 @@ class FunctionPeer(Peer):
         function: Callable[[LiveStep], object] = id,
         messages: Iterable[Mapping[str, Any]] = (),
     ) -> None:
-        """Take a function, and messages that are read in a thread of their own."""
+        """Wrap a function, and messages that are read in a thread of their own."""
         self._function = function
         self._messages = messages
 
@@ -94,7 +95,7 @@ def from_iterator(messages: Iterable[Mapping[str, Any]]) -> FunctionPeer:
 
 
 def hello(simulation: Simulation) -> dict[str, Any]:
-    """Return the first message to a program: what the run is."""
+    """Return the first message to a program, which describes the run."""
     scenario = simulation.scenario
     return {
         "type": "hello",
@@ -112,7 +113,7 @@ def hello(simulation: Simulation) -> dict[str, Any]:
 
 
 class UdpPeer(Peer):
-    """Messages in datagrams, one JSON object each; senders are told what becomes of goals."""
+    """Messages in datagrams, one JSON object each; senders get the states of goals."""
 
     def __init__(self, host: str, port: int) -> None:
         """Listen at an address; port 0 is a free one."""
@@ -157,7 +158,7 @@ class UdpPeer(Peer):
 
 
 class WebSocketPeer(Peer):
-    """A WebSocket server: clients get all that happens as JSON, and may send messages."""
+    """A WebSocket server: clients get poses and events as JSON, and may send messages."""
 
     def __init__(self, host: str, port: int) -> None:
         """Serve at an address; port 0 is a free one.
@@ -275,7 +276,7 @@ class WebSocketPeer(Peer):
 
 
 def _cut(connection: Any) -> None:
-    """End a connection whose client doesn't read: closing it properly would wait for that."""
+    """End a connection without closing it, which would wait for a client that doesn't read."""
     with contextlib.suppress(OSError):
         connection.socket.shutdown(socket.SHUT_RDWR)
 
@@ -362,11 +363,11 @@ class MqttPeer(Peer):
 
         self.prefix = prefix
         self._address = f"mqtt://{host}:{port}"
-        self._retained: dict[str, str] = {}  # what a broker that was restarted has lost
-        self._on: dict[str, str] = {}  # the word of each sensor for being on
-        self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # "", or why it refuses
+        self._retained: dict[str, str] = {}  # a restarted broker has lost these
+        self._on: dict[str, str] = {}  # each sensor's word for on
+        self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # refusals, or ""
         self._post: Post | None = None
-        # What arrives before the run begins.
+        # Messages that arrive before the run begins.
         self._early: deque[bytes | PeerFault] = deque(maxlen=MAX_EARLY)
         self._client: Any = Client(CallbackAPIVersion.VERSION2)
         self._client.max_queued_messages_set(MAX_EARLY)  # while there is no broker
@@ -375,7 +376,7 @@ class MqttPeer(Peer):
         self._client.on_connect = self._greet
         self._client.on_subscribe = self._subscribed
         self._client.on_message = lambda *args: self._receive(args[-1])
-        self._name = uuid.uuid4().hex.encode()  # of this run, among those of the prefix
+        self._name = uuid.uuid4().hex.encode()  # tells runs of one prefix apart
         self._others = {self._name}
         self._is_missing = False
         try:
@@ -393,7 +394,7 @@ class MqttPeer(Peer):
         """Wait until the broker takes the subscription.
 
         Raises:
-            InputError: It refuses, or it doesn't answer.
+            InputError: The broker refuses, or doesn't answer.
         """
         try:
             refusal = self._answers.get(timeout=WAIT_S)
@@ -405,7 +406,7 @@ class MqttPeer(Peer):
             raise InputError(f"{self._address}: {refusal}")
 
     def _greet(self, *arguments: Any) -> None:
-        """Subscribe, and publish what the broker is to keep: at each connection."""
+        """Subscribe, and publish the retained messages, at each connection."""
         if (reason := arguments[3]).is_failure:
             self._answer(f"the broker refuses the connection: {reason}")
             return
@@ -485,12 +486,12 @@ class MqttPeer(Peer):
             "device": {"identifiers": [node], "name": "Fleet2D", "manufacturer": "Fleet2D"},
             **config,
         }
-        # Home Assistant takes ASCII only: other letters by their numbers, so that no two are alike.
+        # Home Assistant takes ASCII only; the numbers of other letters keep names distinct.
         place = re.sub(r"[^A-Za-z0-9_-]", lambda letter: f"_{ord(letter[0]):x}", name)
         self._retain(f"{DISCOVERY}/{component}/{node}/{place}/config", json.dumps(content))
 
     def _retain(self, topic: str, text: str) -> None:
-        """Publish what the broker is to keep."""
+        """Publish a message that the broker retains."""
         self._retained[topic] = text
         self._client.publish(topic, text, qos=1, retain=True)
 
@@ -512,7 +513,7 @@ class MqttPeer(Peer):
             self._publish(f"row/{table}", json.dumps(row, default=str))
 
     def tell(self, text: str) -> None:
-        """Publish a note about what arrived."""
+        """Publish a note about messages."""
         self._publish("note", text)
 
     def close(self, run: Run) -> None:

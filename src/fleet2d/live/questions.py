@@ -1,8 +1,8 @@
-"""Questions to the tables of a run: one SELECT in SQL, which reads nothing else.
+"""Questions about the tables of a run: one SELECT in SQL, which reads nothing else.
 
-DuckDB answers it, without files, networks, extensions and settings. Its own syntax tree is checked
-before: a table, a column, a function or a value that isn't there is an error with the nearest name,
-since an answer without rows would look like the truth.
+DuckDB answers without files, networks, extensions and settings. The syntax tree is checked before:
+an unknown table, column, function or value is an error with the nearest name, since an answer
+without rows would look like the truth.
 """
 
 import json
@@ -74,10 +74,10 @@ def answer(tables: "Mapping[str, pa.Table]", query: str, limit: int = 50) -> dic
         limit: The number of rows to show, `MAX_ROWS` at most.
 
     Returns:
-        The number of rows, those that are shown, and what is left out of them, if anything is.
+        The number of rows, the rows shown, and a note if some are left out.
 
     Raises:
-        InputError: It isn't one SELECT; it names something that the tables lack; or it takes too
+        InputError: The query isn't one SELECT, names something that the tables lack, or takes too
             much time or memory.
 
     Example:
@@ -114,14 +114,14 @@ def answer(tables: "Mapping[str, pa.Table]", query: str, limit: int = 50) -> dic
 
 @contextmanager
 def _limited(connection: "duckdb.DuckDBPyConnection") -> Iterator[None]:
-    """Interrupt what takes too long, and tell failures of DuckDB in one line."""
+    """Interrupt queries that take too long, and turn failures of DuckDB into one line."""
     import duckdb
 
     done = threading.Event()
 
     def watch() -> None:
         if not done.wait(MAX_S):
-            while not done.wait(0.1):  # each statement, also one that begins later
+            while not done.wait(0.1):  # again, as another statement may begin
                 connection.interrupt()
 
     threading.Thread(target=watch, daemon=True).start()
@@ -172,7 +172,7 @@ def _checked(
 
 
 def _in_local_time(table: "pa.Table") -> "pa.Table":
-    """Return a table with the times of a time zone as the home's clock reads them."""
+    """Return a table with times in a time zone as local times of the home."""
     for number, field in enumerate(table.schema):
         if getattr(field.type, "tz", None):
             import pyarrow.compute as pc  # few runs have a time zone
@@ -207,7 +207,7 @@ def _tables_of(nodes: list[Node], tables: Mapping[str, object]) -> Iterator[str]
 
 
 def _given_names(nodes: list[Node]) -> dict[str, str]:
-    """Return the new names of columns in a query, each with the old one; "" if it has none."""
+    """Return the aliases of columns in a query with their columns, or "" for other expressions."""
     given: dict[str, str] = {}
     for node in nodes:
         if "class" in node and node["alias"]:
@@ -225,7 +225,7 @@ def _last_name(column: Node) -> str:
 
 
 def _comparisons(nodes: list[Node]) -> Iterator[tuple[Node, Node]]:
-    """Yield each column, and what it is compared with."""
+    """Yield each comparison of a column: the column, and the value."""
     for node in nodes:
         pairs: list[tuple[Node, Node]] = []
         if node.get("class") == "COMPARISON":
@@ -242,7 +242,7 @@ def _comparisons(nodes: list[Node]) -> Iterator[tuple[Node, Node]]:
 def _check_value(
     column: str, value: Node, tables: "Mapping[str, pa.Table]", names: set[str]
 ) -> None:
-    """Refuse a text that a column of texts doesn't have; a word that is no column is a text."""
+    """Refuse a text that a column of texts lacks; a word that is no column counts as a text."""
     known = _texts_of(column, tables)
     if known is None:
         return
@@ -277,7 +277,7 @@ def _texts_of(column: str, tables: "Mapping[str, pa.Table]") -> list[str] | None
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that JSON has; of a long text the beginning."""
+    """Return a value as JSON data; of a long text only the beginning."""
     if isinstance(value, bool | int | None) or (isinstance(value, float) and isfinite(value)):
         return value
     text = str(value)

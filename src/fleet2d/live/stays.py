@@ -1,4 +1,4 @@
-"""How long somebody stays where, and does what: sums of a run by room, activity, hour or day."""
+"""The stays and activities of a body: sums of a run by room, activity, hour or day."""
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta
@@ -25,7 +25,7 @@ class Stay(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """Its length [steps]."""
+        """The length [steps]."""
         return self.end - self.begin
 
 
@@ -60,7 +60,7 @@ def summary(run: Run, who: str, by: By = "room", of: str = "") -> list[dict[str,
     Args:
         run: A run with key frames.
         who: A person or robot.
-        by: What a row is for.
+        by: The unit of a row.
         of: The room or activity that is summed by hour or day; a kind of room counts all of it.
 
     Returns:
@@ -82,7 +82,7 @@ def summary(run: Run, who: str, by: By = "room", of: str = "") -> list[dict[str,
 
 def _by_name(run: Run, stays: list[Stay]) -> list[dict[str, Any]]:
     rows = []
-    by_name = sorted(stays, key=lambda stay: stay.what)  # stable: in order of time
+    by_name = sorted(stays, key=lambda stay: stay.what)  # the sort keeps the order of time
     for what, group in groupby(by_name, key=lambda stay: stay.what):
         own = list(group)
         longest = max(own, key=lambda stay: stay.steps)
@@ -103,7 +103,7 @@ def _chosen(run: Run, who: str, of: str) -> list[Stay]:
     """Return the stays in a room, or in rooms of a kind, or of an activity.
 
     Raises:
-        InputError: There is none of that name.
+        InputError: There is no room or activity of that name.
     """
     if not of:
         raise InputError("name a room, a kind of room or an activity by `of`, or 'away'")
@@ -120,7 +120,7 @@ def _chosen(run: Run, who: str, of: str) -> list[Stay]:
 
 
 def _by_hour(run: Run, stays: list[Stay]) -> Iterator[dict[str, Any]]:
-    """Yield each hour of the day with the share of it that is spent so, over all days."""
+    """Yield each hour of the day with the share of it in such stays, over all days."""
     inside = np.zeros(run.clock.steps, bool)
     for stay in stays:
         inside[stay.begin : stay.end] = True
@@ -135,7 +135,7 @@ def _by_hour(run: Run, stays: list[Stay]) -> Iterator[dict[str, Any]]:
 
 
 def _by_day(run: Run, stays: list[Stay]) -> Iterator[dict[str, Any]]:
-    """Yield each day with the hours that are spent so, and the first and last moment."""
+    """Yield each day with the hours in such stays, and their first and last moment."""
     pieces: dict[str, list[Stay]] = {}
     for stay in stays:
         begin = stay.begin

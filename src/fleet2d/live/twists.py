@@ -1,4 +1,4 @@
-"""Speeds of robots between two poses, as odometry has them."""
+"""Speeds of robots between two poses, as in odometry."""
 
 from typing import TYPE_CHECKING
 
@@ -19,8 +19,8 @@ def twists(plan: "FloorPlan", before: F64, after: F64, passed_s: float) -> F64:
     Args:
         plan: The floor plan.
         before: x, y [m] and heading [rad] before each move, float64 (n, 3).
-        after: Those after it, float64 (n, 3).
-        passed_s: How long each takes.
+        after: x, y [m] and heading [rad] after each move, float64 (n, 3).
+        passed_s: The time that each move takes.
 
     Returns:
         float64 (n, 3).

@@ -1,4 +1,4 @@
-"""Exporters by their formats, and what they export: a part of a run, in bounded memory.
+"""Exporters by format, and the parts of runs that they export in bounded memory.
 
 `export_NAME` in the module of a format writes a stored run to a file for other programs. A format
 of an installed package is an entry point of the group `fleet2d.exporter`: a function with the same
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from fleet2d.runs.run import Run
 
 
-# Poses of all bodies in one chunk. As Python objects they take up to 2 kB each.
+# The poses of all bodies in one chunk, each of which takes up to 2 kB as Python objects.
 MAX_POSES = 20_000
-# Tables that hold poses: exporters have the poses themselves.
+# Tables that hold poses, which exporters get from `Chunk.poses`.
 POSES = ("key_frames", "trajectories")
 
 
@@ -104,7 +104,7 @@ class Records:
 
     Attributes:
         run: The run.
-        part: The part of it.
+        part: The part of the run.
 
     Example:
         >>> import fleet2d
@@ -159,7 +159,7 @@ class Records:
 def _by_step(table: "pa.Table") -> "tuple[pa.Table, I64]":
     """Return a table in order of step, and the step of each row."""
     step = table["step"].to_numpy()
-    if np.any(step[1:] < step[:-1]):  # such as violations, which are listed when they end
+    if np.any(step[1:] < step[:-1]):  # violations are listed when they end
         order = np.argsort(step, kind="stable")
         table = table.take(order)
         step = step[order]
@@ -204,7 +204,7 @@ _FORMATS = {
         "ROS 2 messages as a bag in MCAP, which `ros2 bag play` plays: needs the extra `ros`.",
     ),
 }
-"""The module of each format, and what it is."""
+"""The module and the description of each format."""
 
 # Formats whose files have another suffix than the name of the format.
 _SUFFIXES = {".txt": "casas", ".db": "home_assistant", "": "rosbag2"}
@@ -242,14 +242,14 @@ def export(
 
 
 def formats() -> dict[str, str]:
-    """Return what each format is, by its name; empty for formats of installed packages."""
+    """Return a description of each format by its name; empty for formats of installed packages."""
     own = {name: text for name, (_, text) in _FORMATS.items()}
     known = dict.fromkeys(_plugins().names, "") | own
     return dict(sorted(known.items()))
 
 
 def format_of(path: Path) -> str:
-    """Return the name of the format of a file with such a name.
+    """Return the name of the format of a file by its suffix.
 
     Raises:
         InputError: No format has this suffix.
@@ -269,7 +269,7 @@ def format_of(path: Path) -> str:
 
 
 def words_of(row: Mapping[str, Any]) -> str:
-    """Return the user and the details of an event, as far as it has them."""
+    """Return the user and the details of an event, if it has them."""
     return " ".join(str(row[key]) for key in ("user", "detail") if row.get(key))
 
 
@@ -278,7 +278,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     """Yield a file that appears, complete, after the block, replacing one of the same name.
 
     Raises:
-        RunDirectoryError: It can't be written.
+        RunDirectoryError: The file can't be written.
     """
     with (
         os_errors_as(RunDirectoryError, f"{path} can't be written"),
@@ -302,7 +302,7 @@ def exporter(name: str) -> Exporter:
         module = importlib.import_module(f"{__name__}.{_FORMATS[name][0]}")
         return cast("Exporter", getattr(module, f"export_{name}"))
     if name not in _plugins().names:
-        # It imports pydantic, which the help needn't.
+        # This imports pydantic, which the help doesn't need.
         from fleet2d.configuration.problems import suggest
 
         raise InputError(f"there is no exporter {name!r}{suggest(name, formats())}")

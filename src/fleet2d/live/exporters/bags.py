@@ -37,7 +37,7 @@ MESSAGE_HEAD = np.dtype(
         ("published", "<u8"),
     ]
 )
-"""What stands before the content of a message."""
+"""The head of a message, before its content."""
 QOS = "offered_qos_profiles"
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 COMPRESSION = "zstd"
@@ -74,7 +74,7 @@ def export_mcap(run: Run, path: Path, part: Selection) -> str:
 
 
 class WrittenChunk(NamedTuple):
-    """Where a chunk is in a file, for its summary."""
+    """The place of a chunk in a file, for the summary of the file."""
 
     begins: int  # the times of its first and last message
     ends: int
@@ -87,13 +87,13 @@ class WrittenChunk(NamedTuple):
 
 
 class McapWriter:
-    """An MCAP file that is written whole blocks of messages at a time.
+    """An MCAP file, written by whole blocks of messages.
 
-    The libraries take a call for each message, which is 5 million for a month at 1 s.
+    Libraries need a call per message: 5 million for a month at 1 s.
 
     Attributes:
         counts: The number of messages of each topic so far.
-        chunks: What has been written so far.
+        chunks: The chunks written so far.
     """
 
     def __init__(self, file: BinaryIO, topics: Sequence[tuple[RosTopic, str]]) -> None:
@@ -116,7 +116,7 @@ class McapWriter:
         self._put(MAGIC, _record(HEADER, _text("ros2"), _text("fleet2d")), self._definitions)
 
     def _put(self, *parts: bytes) -> int:
-        """Write, and return where."""
+        """Write bytes, and return their place in the file."""
         at = self._at
         for part in parts:
             self._at += self._file.write(part)
@@ -155,14 +155,14 @@ class McapWriter:
         self.chunks.append(WrittenChunk(begins, ends, at, length, indices, *sizes))
 
     def _fill_heads(self, blocks: Sequence[Block]) -> None:
-        """Write what stands before the messages of a topic."""
+        """Write the heads of the messages of a topic."""
         topic = blocks[0].topic
         times = np.concatenate([block.times for block in blocks])
         heads = np.empty(len(times), MESSAGE_HEAD)
         heads["record"] = MESSAGE
         heads["channel"] = self._channels[topic]
         sizes = np.concatenate([block.sizes for block in blocks])
-        heads["length"] = sizes - 9  # without the code and the length
+        heads["length"] = sizes - 9  # the code and the length don't count
         order = np.argsort(times, kind="stable")
         heads["sequence"][order] = np.arange(len(times)) + self.counts[topic]
         heads["logged"] = heads["published"] = times
@@ -178,7 +178,7 @@ class McapWriter:
                 block.data[places] = own.view(np.uint8).reshape(places.shape)
 
     def finish(self) -> None:
-        """Write the summary, by which readers find what is where."""
+        """Write the summary, by which readers find chunks and channels."""
         self._put(_record(DATA_END, struct.pack("<I", 0)))
         summary = self._put(self._definitions)
         # By channel, so that a run makes the same file in every process.
@@ -203,7 +203,7 @@ class McapWriter:
 
 
 def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
-    """Return the messages of some blocks in order of time, and where those of each are then."""
+    """Return the messages of blocks in order of time, and the places of those of each block."""
     rows = _alike(blocks)
     times_by_row = []
     sizes_by_row = []
@@ -221,8 +221,8 @@ def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
     places[order] = np.cumsum(sizes[order]) - sizes[order]
     firsts = np.flatnonzero(np.diff(number, prepend=-1))
     own = np.cumsum(sizes) - sizes
-    own -= np.repeat(own[firsts], np.diff(firsts, append=len(own)))  # within the row
-    # What is next to each other in a row and in time is one piece.
+    own -= np.repeat(own[firsts], np.diff(firsts, append=len(own)))  # relative to the row
+    # Messages that are neighbours in a row and in time form a piece.
     piece = np.flatnonzero(np.diff(number[order], prepend=-1))
     last = order[np.append(piece[1:], len(order)) - 1]
     begins = own[order[piece]].tolist()
@@ -239,7 +239,7 @@ def _merged(blocks: Sequence[Block]) -> tuple[bytes, list[I64]]:
 
 
 def _alike(blocks: Sequence[Block]) -> list[list[int]]:
-    """Return which blocks can be side by side: of equal times, and each of one size."""
+    """Return the blocks that can stand side by side: with equal times and one size each."""
     rows: list[list[int]] = []
     has_one_size = [bool((block.sizes == block.sizes[0]).all()) for block in blocks]
     for i, block in enumerate(blocks):
@@ -385,7 +385,7 @@ def _write(messages: RosMessages, file: BinaryIO) -> "McapWriter":
 
 
 def bag_metadata(messages: RosMessages, writer: McapWriter, file: str) -> dict[str, object]:
-    """Return what `metadata.yaml` of a bag says of its file."""
+    """Return the content of `metadata.yaml` for the file of a bag."""
     begin = min((chunk.begins for chunk in writer.chunks), default=0)
     end = max((chunk.ends for chunk in writer.chunks), default=0)
     times: dict[str, object] = {

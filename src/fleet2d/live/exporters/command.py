@@ -84,7 +84,7 @@ def _refuse(reason: str, **options: object) -> None:
     """Refuse options that are given.
 
     Raises:
-        InputError: One is.
+        InputError: Such an option is given.
     """
     for name, value in options.items():
         if value is not None:

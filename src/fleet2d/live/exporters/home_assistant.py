@@ -22,8 +22,8 @@ from fleet2d.runs.trajectory import Trajectory
 from fleet2d.runtime.clock import Clock
 from fleet2d.runtime.local_time import stamp_us
 
-# The edition of the database, of Home Assistant 2024.3. Later ones bring it up to date when they
-# start, and make the tables that aren't here; a start looks for the first four.
+# The version of the database, of Home Assistant 2024.3. Later versions migrate it at their start
+# and make the missing tables; a start looks for the first four.
 SCHEMA = 42
 TABLES = """
 CREATE TABLE states (state_id INTEGER PRIMARY KEY, entity_id CHAR(0), state VARCHAR(255),
@@ -134,7 +134,7 @@ def _utc(clock: Clock, step: int) -> str:
 
 
 def entity_name(kind: str, name: str) -> str:
-    """Return an entity's name, of the letters that Home Assistant takes.
+    """Return the name of an entity in the letters that Home Assistant accepts.
 
     Example:
         >>> entity_name("sensor", "Küche 2"), entity_name("person", "مريم")
@@ -161,7 +161,7 @@ def _entities(run: Run) -> dict[str, dict[str, str]]:
 
 
 def _sensors(run: Run) -> dict[str, type[Sensor]]:
-    """Return the class of each sensor, by its name: of the scenario's own ones the base class."""
+    """Return the class of each sensor by its name; for a scenario's own classes the base class."""
     known = components("object")
     objects = run.manifest["scenario"].get("objects", {})
     classes = {name: known.get(item["type"], Sensor) for name, item in objects.items()}

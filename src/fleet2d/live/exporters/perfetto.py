@@ -1,4 +1,4 @@
-"""A run as trace events for Perfetto: a process for each body, a track for each part of it.
+"""A run as trace events for Perfetto: a process for each body, with its tracks.
 
 The format is the JSON of Chrome's Trace Event Format, which https://ui.perfetto.dev opens: objects
 with `ph` (X: a slice of duration `dur`, i: an instant, C: a counter, M: a name), `ts` [us], `pid`,
@@ -22,7 +22,7 @@ from fleet2d.runtime.events import EventKind
 TRACKS = ("plan", "motion", "people", "sight", "power", "events")
 """The tracks of a body, in order; the thread of each is its place, from 1 on."""
 
-# What begins a slice of a track, and what ends it; a slice also ends with the next of its track.
+# Events that begin a slice of a track, and that end it; the next slice of the track also ends it.
 _ANSWERED = frozenset({*OUTCOMES, EventKind.WITHDRAWS, EventKind.BROKEN_OFF, EventKind.DELIVERED})
 _SLICES: Mapping[str, tuple[str, frozenset[str]]] = {
     EventKind.ACTIVITY: ("plan", frozenset({EventKind.LEFT_HOME})),
@@ -39,7 +39,7 @@ _CHARGES = frozenset({EventKind.BATTERY, EventKind.DOCKS, EventKind.CHARGED})
 
 
 class Slice(NamedTuple):
-    """A stretch of steps on a track of a body, with a name and what else is known of it."""
+    """A stretch of steps on a track of a body, with a name and arguments."""
 
     track: str
     first: int

@@ -57,7 +57,7 @@ class Block(NamedTuple):
         topic: The topic.
         times: Their times [ns since 1970], int64 (n,).
         sizes: The size of each, with a margin before it for the writer of a file, int64 (n,).
-        data: One after the other, uint8 (sum of sizes,).
+        data: The messages one after the other, uint8 (sum of sizes,).
     """
 
     topic: str
@@ -75,7 +75,7 @@ class RosMessages:
     """
 
     def __init__(self, records: Records, margin: int = 0) -> None:
-        """Find out what topics there are.
+        """Collect the topics of a part of a run.
 
         Args:
             records: The part of a run.
@@ -172,7 +172,7 @@ class RosMessages:
         return self._encode("nav_msgs/msg/OccupancyGrid", grid)
 
     def _static_transforms(self, time: int) -> bytes:
-        """Odometry in Fleet2D doesn't drift from the map: errors of localization are in beliefs."""
+        """Return the static transforms: odometry in Fleet2D doesn't drift from the map."""
         header = self._header(time, "map")
         still = pose_at(0.0, 0.0, 0.0)
         frames = [transform(header, f"{robot}/odom", still) for robot in self._records.robots]
@@ -246,7 +246,7 @@ class RosMessages:
         step, x, y = (table[name].to_numpy() for name in ("step", "x", "y"))
         robot, robots = _codes(table["robot"])
         user, users = _codes(table["user"])
-        users = [*users, UNKNOWN]  # the code -1
+        users = [*users, UNKNOWN]  # for the code -1
         has_heading = "heading" in table.column_names
         heading = np.nan_to_num(table["heading"].to_numpy()) if has_heading else np.zeros(len(x))
         is_first = (np.diff(step, prepend=-1) != 0) | (np.diff(robot, prepend=-1) != 0)
@@ -255,7 +255,7 @@ class RosMessages:
         kinds = np.unique(np.stack([robot[first], count], axis=-1), axis=0)
         for of, size in kinds.tolist():
             looks = first[(robot[first] == of) & (count == size)]
-            rows = looks[:, None] + np.arange(size)  # (looks, people)
+            rows = looks[:, None] + np.arange(size)  # shape (looks, people)
             people = user[rows]
             changes = np.flatnonzero((people[1:] != people[:-1]).any(axis=1)) + 1
             for who in np.unique(people[[0, *changes]], axis=0):
@@ -338,7 +338,7 @@ class Template:
     def __init__(
         self, message: Callable[[Sequence[int], Sequence[float]], bytes], times: int, values: int
     ) -> None:
-        """Serialize a message with numbers that stand nowhere else, to find their places."""
+        """Serialize a message with unique numbers, to find the places of numbers."""
         stamps = [(1_000_000_007 + i) * 1_000_000_000 + 999_000_001 + i for i in range(times)]
         floats = [1.2345678901234e200 * (i + 1) for i in range(values)]
         data = message(stamps, floats)

@@ -1,4 +1,4 @@
-"""Text files: poses as CSV, records as JSON Lines, sensors as CASAS has them."""
+"""Text files: poses as CSV, records as JSON Lines, readings in the format of CASAS."""
 
 import json
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What a live run needs of a node of ROS 2, whichever library connects it to the graph."""
+"""The interface of a node of ROS 2, whichever library connects it to the graph."""
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
@@ -9,10 +9,10 @@ Fields = Mapping[str, Any]
 
 
 class Quality(NamedTuple):
-    """The quality of service of a topic; what isn't here is as ROS has it by default.
+    """The quality of service of a topic; all else has the defaults of ROS.
 
     Attributes:
-        depth: How many messages are kept.
+        depth: The number of messages that are kept.
         is_latched: Whether later subscribers get the last ones.
     """
 
@@ -35,7 +35,7 @@ class ActionStatus(IntEnum):
 
     @property
     def is_over(self) -> bool:
-        """Whether it is final."""
+        """Whether the state is final."""
         return self >= self.SUCCEEDED
 
 
@@ -70,7 +70,7 @@ class RosAction(Protocol):
         """Publish feedback about a goal."""
 
     def finish(self, goal: ActionGoal, status: ActionStatus, result: Fields) -> None:
-        """End a goal: whoever waits for the result hears it."""
+        """End a goal, and send the result to clients that wait for it."""
 
 
 class RosNode(Protocol):
@@ -79,7 +79,7 @@ class RosNode(Protocol):
     Attributes:
         distribution: The version of ROS 2.
         hears_several_types: Whether it can hear messages of several types on a topic.
-        notes: What it can't do, and why.
+        notes: Notes on what it leaves out, and why.
     """
 
     distribution: str
@@ -102,8 +102,8 @@ class RosNode(Protocol):
         Args:
             name: The topic.
             of: The type of its messages.
-            heard: Called with the fields of each.
-            wrong: Called with what is wrong with one that can't be read.
+            heard: Called with the fields of each message.
+            wrong: Called with the fault of a message that can't be read.
             quality: Its quality of service.
         """
 

@@ -1,4 +1,4 @@
-"""A node of ROS 2 over its own Python library, where that is there: with any middleware.
+"""A node of ROS 2 over its Python library, if that is installed, with any middleware.
 
 Types of messages are packages of ROS; topics whose type isn't installed are left out, with a note.
 """
@@ -28,7 +28,7 @@ _ENDS = {
 
 def is_rclpy_there() -> bool:
     """Return whether the library of ROS can be imported and works in this process."""
-    with suppress(Exception):  # a library of another Python or NumPy raises whatever it meets
+    with suppress(Exception):  # a library for another Python or NumPy may raise anything
         importlib.import_module("rclpy.action")
         importlib.import_module("rosgraph_msgs.msg").Clock()
         return True
@@ -129,7 +129,7 @@ class RclpyNode:
 
 
 class RclpyAction:
-    """An action whose goals the simulation ends, and not a thread that waits."""
+    """An action whose goals are ended by the simulation rather than by a waiting thread."""
 
     def __init__(
         self,
@@ -146,7 +146,7 @@ class RclpyAction:
         self._cls: Any = None
 
     def serve(self, library: Any, node: Any, cls: Any, name: str) -> None:
-        """Serve it by the library's server."""
+        """Serve the action by the library's server."""
         action = library.action
         self._cls = cls
 
@@ -190,7 +190,7 @@ class RclpyAction:
         handle.publish_feedback(filled(self._cls.Feedback(), feedback))
 
     def finish(self, goal: ActionGoal, status: ActionStatus, result: Fields) -> None:
-        """End a goal: whoever waits for the result hears it."""
+        """End a goal, and send the result to clients that wait for it."""
         with self._lock:
             _, handle, future = self._goals.pop(goal.id)
         goal.status = status

@@ -1,4 +1,4 @@
-"""What programs of ROS send to a run: poses, goals and velocities, whichever way they arrive."""
+"""Messages of ROS to a run: poses, goals and velocities, whichever way they arrive."""
 
 import math
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from fleet2d.storage.bags import LATEST_SIMULATED_NS, headings_of
 POSE = "geometry_msgs/msg/PoseStamped"
 TWISTS = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 """The types of `cmd_vel`: Nav2 sends the first one up to Jazzy, the second one from Kilted on."""
-# A stamp so near to the simulated time is of its clock, and not of a clock on the wall [ns].
+# A stamp this near to the simulated time is of the simulated clock rather than a wall clock [ns].
 NEAR_NS = 86_400 * 10**9
 
 
@@ -40,7 +40,7 @@ class _RosPoint(BaseModel):
 
 
 class _RosQuaternion(BaseModel):
-    """A turn; rosbridge has null for NaN."""
+    """A rotation; rosbridge writes null for NaN."""
 
     x: float | None = 0.0
     y: float | None = 0.0
@@ -74,12 +74,12 @@ class _Twist(BaseModel):
 
 
 def velocities_of(name: str, topic: str, message: object) -> Iterator[Content]:
-    """Yield the message to a run that a `Twist` or `TwistStamped` is, or what is wrong with it.
+    """Yield the velocity in a `Twist` or `TwistStamped` as a message to a run, or its fault.
 
     Args:
         name: The robot.
         topic: The topic on which it arrived.
-        message: The message of ROS as JSON has it.
+        message: The message of ROS as JSON data.
     """
     if isinstance(message, dict) and "twist" in message:  # a TwistStamped
         message = message["twist"]
@@ -96,13 +96,13 @@ def velocities_of(name: str, topic: str, message: object) -> Iterator[Content]:
 def contents_of(
     name: str, kind: str, topic: str, message: object, now_ns: int | None = None
 ) -> Iterator[Content]:
-    """Yield the message to a run that a `PoseStamped` is, and what is odd about it.
+    """Yield the pose or goal in a `PoseStamped` as a message to a run, and faults of it.
 
     Args:
         name: The body.
         kind: "pose" or "goal".
         topic: The topic on which it arrived.
-        message: The message of ROS as JSON has it.
+        message: The message of ROS as JSON data.
         now_ns: The simulated time, if ROS hears it: a stamp near it says nothing about lateness.
     """
     try:

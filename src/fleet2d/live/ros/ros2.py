@@ -65,7 +65,7 @@ def domain_of_environment() -> int:
     """Return the domain of ROS, `ROS_DOMAIN_ID`.
 
     Raises:
-        InputError: It isn't one.
+        InputError: The variable holds no domain.
     """
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if not (text.isascii() and text.isdigit() and int(text) <= MAX_DOMAIN):
@@ -86,7 +86,7 @@ class Ros2Peer(Peer):
         """Join the graph.
 
         Args:
-            host: The machine of zenoh's router; this one: it is started here if there is none.
+            host: The machine of zenoh's router; on this one it is started if there is none.
             port: Its port.
             path: `DISTRIBUTION/ROBOT`: the version of ROS 2, `ROS_DISTRO` by default; the robot
                 whose topics and frames have no prefix.
@@ -106,7 +106,7 @@ class Ros2Peer(Peer):
         self._actions: dict[str, RosAction] = {}
 
     def open(self, simulation: Simulation, post: Post) -> None:
-        """Publish what is latched, subscribe, and serve.
+        """Publish latched messages, subscribe, and serve actions.
 
         Raises:
             InputError: The robot without a prefix isn't in the scenario.
@@ -179,7 +179,7 @@ class Ros2Peer(Peer):
         return self._poses_of(name, "pose", topic, {**message, "pose": message["pose"]["pose"]})
 
     def _begin(self, robot: str, goal: ActionGoal) -> bool:
-        """Pass a goal on, if it is one: whether the robot gets there is its result."""
+        """Pass a goal on if it is valid; whether the robot gets there is its result."""
         topic = f"{robot}: navigate_to_pose"
         contents = list(self._poses_of(robot, "goal", topic, goal.fields["pose"]))
         for content in contents:
@@ -187,7 +187,7 @@ class Ros2Peer(Peer):
         return isinstance(contents[-1], dict)
 
     def send(self, frame: LiveStep) -> None:
-        """Publish a frame, and tell clients of actions what becomes of their goals."""
+        """Publish a frame, and send clients of actions the states of their goals."""
         for topic, message in self._topics.of(frame):
             self._publishers[topic.name](message)
         for goal in frame.goals:
@@ -201,9 +201,9 @@ class Ros2Peer(Peer):
     def _answer(
         self, server: RosAction, asked: ActionGoal, goal: GoalState, frame: LiveStep
     ) -> None:
-        """Tell the client of a goal its end, or how far the robot is."""
+        """Send the client of a goal its end, or feedback on the way."""
         status = _STATUSES.get(goal.state)
-        if goal.state == GoalStatus.ACCEPTED:  # which the client has heard
+        if goal.state == GoalStatus.ACCEPTED:  # the client knows
             return
         if status is None:
             server.tell(asked, self._feedback(asked, goal, frame))
@@ -240,7 +240,7 @@ class Ros2Peer(Peer):
 
 
 def simulation_step(simulation: Simulation) -> int:
-    """Return the step of the last frame: that of the clock that ROS hears."""
+    """Return the step of the last frame, which the clock of ROS shows."""
     return max(0, simulation.step - 1)
 
 

@@ -1,7 +1,7 @@
-"""rosbridge: the topics of a live run on a rosbridge server, and what programs of ROS send to it.
+"""rosbridge: the topics of a live run on a rosbridge server, and messages of ROS to the run.
 
 Subscribed, for each body: `/NAME/goal_pose` and `/NAME/pose` in the frame `map`, and for each robot
-`/NAME/cmd_vel`. What becomes of a goal is on `/NAME/goal_state`, as JSON.
+`/NAME/cmd_vel`. The states of goals are on `/NAME/goal_state`, as JSON.
 """
 
 import contextlib
@@ -107,12 +107,12 @@ class RosbridgePeer(Peer):
 
 
 def _plain(kind: str) -> str:
-    """Return the name of a type as both versions of ROS know it, such as nav_msgs/Odometry."""
+    """Return the name of a type that both versions of ROS know, such as nav_msgs/Odometry."""
     return kind.replace("/msg/", "/")
 
 
 def _as_json(value: Any) -> Any:
-    """Return a message with lists in place of arrays, and null for what is no finite number."""
+    """Return a message with lists in place of arrays, and null for numbers that aren't finite."""
     if isinstance(value, np.ndarray):
         return _as_json(value.tolist())
     if isinstance(value, dict):

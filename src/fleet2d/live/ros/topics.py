@@ -1,4 +1,4 @@
-"""What a run publishes to ROS, whichever way it gets there: topics, types and frames.
+"""The topics, types and frames that a run publishes to ROS, by whichever way.
 
 A message is a mapping of the fields of its type in ROS 2; fields that are left out are 0 or empty.
 Frames and stamps are those of `fleet2d export`: the truth about bodies is in `/tf` and
@@ -24,7 +24,7 @@ BEAMS = 360
 """Number of beams of a laser scan, over a whole turn."""
 SCAN_RANGE_M = 12.0
 EXACT = np.zeros(36)
-"""The covariance of what is known exactly."""
+"""The covariance of an exact pose."""
 PERSON_M = (0.4, 0.4, 1.7)
 """The box of a detected person, whose true size no robot knows: x, y, z [m]."""
 UNKNOWN = "unknown"
@@ -61,7 +61,7 @@ class RosTopics:
     """
 
     def __init__(self, simulation: "Simulation", root: str | None = None) -> None:
-        """Find out what topics there are.
+        """Collect the topics of a run.
 
         Args:
             simulation: The run.
@@ -111,7 +111,7 @@ class RosTopics:
         return stamp_at(self.time_ns(step))
 
     def once(self, step: int = 0) -> Iterator[Message]:
-        """Yield what is latched: the map, and the frames that don't move."""
+        """Yield the latched messages: the map, and the static frames."""
         header = self._header(step, "map")
         yield self._map, occupancy_grid(header, self._simulation.home.plan)
         still = pose_at(0.0, 0.0, 0.0)
@@ -119,7 +119,7 @@ class RosTopics:
         yield self._static, {"transforms": fixed}
 
     def of(self, frame: "LiveStep") -> Iterator[Message]:
-        """Yield the messages of a step, the clock first: who hears a stamp knows its time."""
+        """Yield the messages of a step, the clock first, so that stamps are known times."""
         step = frame.step
         yield self._clock, {"clock": self.stamp(step)}
         present = {name: body for name, body in frame.bodies.items() if not body["away"]}
@@ -233,7 +233,7 @@ def pose_of(x: float, y: float, z: float, w: float) -> dict[str, Any]:
 
 
 def stamp_at(time_ns: int) -> dict[str, int]:
-    """Return a time [ns since 1970] as ROS writes it."""
+    """Return a time [ns since 1970] as a stamp of ROS."""
     seconds, nanoseconds = divmod(time_ns, 10**9)
     return {"sec": seconds, "nanosec": nanoseconds}
 
@@ -284,7 +284,7 @@ def detection(header: Fields, user: str, pose: Fields, centre: Fields) -> dict[s
 
 
 def scan_of(walls: Mesh, x: int, y: int, heading: float) -> F64:
-    """Return how far a laser scanner sees to the next wall, float64 (BEAMS,) [lattice units].
+    """Return the ranges of a laser scanner to the next walls, float64 (BEAMS,) [lattice units].
 
     Beams begin behind and turn counter-clockwise. Furniture and people are lower than the laser.
 

@@ -1,7 +1,7 @@
 """Types of ROS 2 without ROS: messages as mappings to CDR and back, and the hashes of REP 2016.
 
-The library rosbags has the types and CDR. It hashes messages only: what rosidl derives from a
-service and an action is registered here as if it were messages.
+The library rosbags has the types and CDR. It hashes messages only: the types that rosidl derives
+from services and actions are registered here as messages.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ from fleet2d.errors import InputError, extra
 from fleet2d.storage.bags import VISION_TYPES
 
 DISTRIBUTIONS = ("humble", "jazzy", "kilted", "lyrical")
-"""The versions of ROS 2 whose wires are known."""
+"""The versions of ROS 2 whose wire formats are known."""
 NAVIGATE = "nav2_msgs/action/NavigateToPose"
 UUID = "unique_identifier_msgs/msg/UUID"
 
@@ -25,7 +25,7 @@ PEOPLE_TYPES = {
     ),
     "people_msgs/msg/People": "std_msgs/Header header\npeople_msgs/Person[] people\n",
 }
-"""The definitions of people_msgs, which programs of social navigation hear."""
+"""The definitions of people_msgs, to which programs of social navigation subscribe."""
 
 _EVENT_INFO = {
     "service_msgs/msg/ServiceEventInfo": (
@@ -64,7 +64,7 @@ class MessageEncoder:
     """Serializes messages that are mappings of their fields, by a store of types of rosbags."""
 
     def __init__(self, store: Any) -> None:
-        """Take the store; types may be added to it later."""
+        """Wrap a store; types may be added to it later."""
         from rosbags.interfaces import Nodetype
 
         self._store = store
@@ -80,7 +80,7 @@ class MessageEncoder:
         return bytes(self._store.serialize_cdr(self._converter(name)(fields), name))
 
     def _make_converter(self, name: str) -> Callable[[Mapping[str, Any]], Any]:
-        """Return what makes a message of a type from a mapping."""
+        """Return a function that makes a message of a type from a mapping."""
         cls = self._store.types[name]
         parts = {field: self._converter_of(kind) for field, kind in self._store.fielddefs[name][1]}
         blank = {field: partial(convert, None) for field, convert in parts.items()}
@@ -93,7 +93,7 @@ class MessageEncoder:
         return convert
 
     def _converter_of(self, kind: Any) -> Callable[[Any], Any]:
-        """Return what makes a field from its value, or from None what it is by default."""
+        """Return a function that makes a field from its value, or its default from None."""
         node, rest = kind
         if node == self._nodes.NAME:
             return lambda value: self._converter(rest)(value)
@@ -127,7 +127,7 @@ class RosTypes:
     """
 
     def __init__(self, distribution: str = "jazzy") -> None:
-        """Collect them.
+        """Collect the types of a distribution.
 
         Raises:
             InputError: The distribution is unknown, or rosbags isn't installed.
@@ -153,7 +153,7 @@ class RosTypes:
         self._encoder = MessageEncoder(self._store)
 
     def _correct_chars(self) -> None:
-        """Let char be uint8, as rosidl has it: else each hash of a service would differ."""
+        """Make char a uint8, as in rosidl: else the hashes of services would differ."""
 
         def corrected(part: Any) -> Any:
             if isinstance(part, tuple):
@@ -187,7 +187,7 @@ class RosTypes:
         self._add_whole(name)
 
     def _add_whole(self, name: str) -> None:
-        """Add a service's event and the service, whose requests and responses are there."""
+        """Add the event of a service and the service, whose request and response exist."""
 
         def at_most_one(kind: str) -> Any:
             return self._nodes.SEQUENCE, (self._named(f"{name}_{kind}"), 1)
@@ -242,14 +242,14 @@ class RosTypes:
         """
         try:
             message = self._store.deserialize_cdr(data, name)
-        except Exception as error:  # the library raises whatever its generated code meets
+        except Exception as error:  # the library's generated code may raise anything
             raise ValueError(f"no {name}: {error}") from error
         fields: dict[str, Any] = _as_mapping(message)
         return fields
 
 
 def _parts(definition: str) -> list[str]:
-    """Return what is between the lines `---` of a definition."""
+    """Return the parts of a definition, which lines `---` separate."""
     return f"\n{definition}".split("\n---")
 
 

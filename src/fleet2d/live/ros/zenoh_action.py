@@ -1,4 +1,4 @@
-"""An action of ROS 2 over its services and topics below `NAME/_action`, as rcl_action has them."""
+"""An action of ROS 2 over services and topics below `NAME/_action`, as in rcl_action."""
 
 import threading
 from collections.abc import Callable
@@ -9,7 +9,7 @@ import numpy as np
 
 from fleet2d.live.ros.node import ActionGoal, ActionStatus, Fields
 
-# Of goals that are over, so many are remembered: clients ask for their results.
+# The number of ended goals that are remembered, as clients ask for their results.
 MAX_GOALS = 1000
 _NONE = 0  # of action_msgs/srv/CancelGoal
 _UNKNOWN_GOAL = 2
@@ -78,7 +78,7 @@ class ZenohAction:
         self._feedback({"goal_id": {"uuid": _uuid(goal.id)}, "feedback": feedback})
 
     def finish(self, goal: ActionGoal, status: ActionStatus, result: Fields) -> None:
-        """End a goal: whoever waits for the result hears it."""
+        """End a goal, and send the result to clients that wait for it."""
         with self._lock:
             kept = self._goals[goal.id]
             kept.status = status
@@ -113,7 +113,7 @@ class ZenohAction:
             del self._goals[name]
 
     def tell_result(self, request: dict[str, Any], reply: Reply) -> None:
-        """Serve `get_result`: a goal that isn't over is answered when it is."""
+        """Serve `get_result`; the reply about an open goal waits for its end."""
         with self._lock:
             goal = self._goals.get(bytes(request["goal_id"]["uuid"]).hex())
             if goal is not None and not goal.status.is_over:

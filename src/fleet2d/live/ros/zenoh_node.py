@@ -1,4 +1,4 @@
-"""A node of ROS 2 that speaks as `rmw_zenoh` does, without ROS.
+"""A node of ROS 2 that speaks the protocol of `rmw_zenoh`, without ROS.
 
 The graph of ROS consists of liveliness tokens; topics, services and actions are keys that hold the
 name and the hash of a type. The formats are those of rmw_zenoh's `docs/design.md`.
@@ -21,13 +21,13 @@ PORT = 7447
 # Number of the message from 1, time [ns since 1970], size of the identifier, identifier.
 _ATTACHMENT = struct.Struct("<qqB16s")
 _ID_BYTES = 16
-_DEFAULT_DEPTH = 42  # of rmw_zenoh, which writes nothing for it
+_DEFAULT_DEPTH = 42  # the default of rmw_zenoh
 _HEARTBEAT_S = 0.5
 _LOCAL = ("localhost", "127.0.0.1", "::1")
 
 
 def _quality_text(quality: Quality) -> str:
-    """Return a quality as rmw_zenoh writes it: nothing for a value by default."""
+    """Return a quality as rmw_zenoh writes it, with nothing for defaults."""
     depth = "" if quality.depth == _DEFAULT_DEPTH else quality.depth
     return f":{1 if quality.is_latched else ''}:,{depth}:,:,:,,"
 
@@ -38,9 +38,9 @@ class ZenohNode:
     Attributes:
         types: The types of messages.
         distribution: The version of ROS 2.
-        notes: What it can't do: nothing.
+        notes: Empty, as it leaves nothing out.
         hears_several_types: Whether it can hear messages of several types on a topic.
-        is_router: Whether it is the router of this machine, as none was there.
+        is_router: Whether it is the router of this machine, which had none.
     """
 
     hears_several_types = True
@@ -48,7 +48,7 @@ class ZenohNode:
     def __init__(
         self, types: RosTypes, host: str = "localhost", port: int = PORT, *, domain: int = 0
     ) -> None:
-        """Join the graph: by the router at an address, or as the router of this machine.
+        """Join the graph through the router at an address, or as the router of this machine.
 
         Where no router of another machine answers, the connection is tried again.
 
@@ -70,7 +70,7 @@ class ZenohNode:
         self._session, self.is_router = self._open(host, port)
         self._id = str(self._session.info.zid())
         self._entities = 0
-        self._kept: list[Any] = []  # declarations end with their last reference
+        self._kept: list[Any] = []  # a declaration ends with its last reference
         self._calls = 0
         self._declare_token("NN")
 
@@ -79,7 +79,7 @@ class ZenohNode:
         if host in (*_LOCAL, "0.0.0.0"):  # noqa: S104 - the user asked for it
             try:
                 return self._zenoh.open(self._config("router", listens=endpoint)), True
-            except self._zenoh.ZError:  # the port is taken: by a router, hopefully
+            except self._zenoh.ZError:  # the port is taken, probably by a router
                 endpoint = f"tcp/127.0.0.1:{port}"
         try:
             return self._zenoh.open(self._config("peer", connects=endpoint)), False
@@ -111,7 +111,7 @@ class ZenohNode:
     def _declare_token(
         self, kind: str, name: str = "", of: str = "", quality: Quality | None = None
     ) -> str:
-        """Tell that an entity is there.
+        """Declare an entity in the graph.
 
         The kinds are NN: node, MP: publisher, MS: subscription, SS: service, SC: client.
         """
@@ -197,7 +197,7 @@ class ZenohNode:
     def serve(
         self, name: str, of: str, answer: Callable[[dict[str, Any], Callable[[Fields], None]], None]
     ) -> None:
-        """Serve: `answer(request, reply)`, which calls `reply(response)` at once or later."""
+        """Serve a service by `answer(request, reply)`, which calls `reply(response)` in time."""
         key = self._key(name, of)
 
         def handle(query: Any) -> None:
@@ -205,7 +205,7 @@ class ZenohNode:
                 number, _, _, client = _ATTACHMENT.unpack(query.attachment.to_bytes())
                 request = self.types.decode(f"{of}_Request", query.payload.to_bytes())
             except (AttributeError, struct.error, ValueError):
-                return  # not a call of ROS
+                return  # the query is no call of ROS
 
             def reply(response: Fields) -> None:
                 head = _ATTACHMENT.pack(number, time.time_ns(), _ID_BYTES, client)
