@@ -15,7 +15,7 @@ from fleet2d.bounds import LOG_DAYS, one_line
 from fleet2d.configuration.problems import did_you_mean
 from fleet2d.configuration.units import micros
 from fleet2d.errors import errors_as
-from fleet2d.kernels import I64, Bool
+from fleet2d.kernels import F64, I64, Bool
 from fleet2d.logs.log import DAY_AND_MONTH, LogError, parse_time
 from fleet2d.runtime.clock import DAY_US
 from fleet2d.runtime.local_time import EPOCH, Zone
@@ -33,6 +33,11 @@ LATEST_US = 7_258_118_400_000_000
 MAX_TIMESTAMP_NS = 8e18
 QUARTER_HOUR_US = 900_000_000
 SINCE_1970_S = 1e8
+# Spreadsheets count days since this one; of 2000 to 2099 in such numbers.
+SPREADSHEET_EPOCH = datetime(1899, 12, 30)
+SPREADSHEET_DAYS = (36526, 73051)
+# No tracker stores a position more often than each 5 ms; as days these are 7 min.
+DENSEST_S = 0.005
 """Fewer seconds count from the beginning of the log."""
 
 
@@ -317,12 +322,33 @@ def parse_numbers(
         raise LogError(f"{path}, line {line[wrong[0]]}: its time is not a number, or out of range")
     largest = float(size.max(initial=0))
     if unit_s is None:
+        _check_days(size, path, line)
         unit_s = next((unit for unit in (1e-9, 1e-6, 1e-3) if largest * unit >= SINCE_1970_S), 1.0)
     has_date = largest * unit_s >= SINCE_1970_S
     if unit_s < 1e-6:
         return Stamps((numbers // round(1e-6 / unit_s)).astype(np.int64), line, has_date, has_date)
     time_us = np.round(numbers * round(unit_s * 1e6)).astype(np.int64)
     return Stamps(time_us, line, has_date, has_date)
+
+
+def _check_days(numbers: F64, path: Path, line: I64) -> None:
+    """Refuse days of a spreadsheet, which would be taken for seconds.
+
+    Raises:
+        LogError: The numbers are in the range of such days, and too dense for seconds.
+    """
+    least, end = SPREADSHEET_DAYS
+    steps = np.diff(numbers[:1000])
+    steps = steps[steps > 0]
+    if not len(steps) or np.median(steps) > DENSEST_S:
+        return
+    if numbers.min() >= least and numbers.max() < end:
+        date = SPREADSHEET_EPOCH + timedelta(minutes=round(float(numbers[0]) * 1440))
+        raise LogError(
+            f"{path}, line {line[0]}: the time {numbers[0]:.10g} looks like days of a spreadsheet,"
+            f" {date:%Y-%m-%d %H:%M}: write times as text, or name the column time_s if these are"
+            " seconds"
+        )
 
 
 def _in_zone(utc_us: I64, name: str, *, at_end: bool) -> tuple[I64, Bool]:
