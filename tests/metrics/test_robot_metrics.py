@@ -261,6 +261,29 @@ def test_a_wrong_verdict_not_at_home_is_counted():
     assert (2, 2, 0.0) == (result["searches"], result["false_out"], result["success"])
 
 
+@pytest.mark.parametrize(
+    "change", [{"put": "astro", "to": [7.0, 6.0]}, {"power": "astro", "duration": "2 min"}]
+)
+def test_time_charging_is_counted_where_docking_begins_again(change):
+    """Only that after the last time that it docked was counted."""
+    document = content("1 d")
+    document["robots"]["astro"]["behaviors"] = ["dock", {"type": "patrol", "dwell": "90 s"}]
+    document["script"] = [{"at": "2500 s", **change}]
+    stored = run(document)
+
+    steps = 0
+    docked_at = None
+    for step, name, _ in events(stored):
+        if name == "docks" and docked_at is None:
+            docked_at = step
+        elif docked_at is not None and name in ("charged", "power_off"):
+            steps += step - docked_at
+            docked_at = None
+    docks = [step for step, name, _ in events(stored) if name == "docks"]
+    assert docks[0] < 2500 < docks[1]
+    assert steps / 6000 == pytest.approx(stored.metrics["battery"]["astro"]["charging"])
+
+
 def test_a_battery_is_empty_until_a_script_charges_it():
     """It counted as empty to the end of the run, though the robot drove on."""
     empty = content("1 d")

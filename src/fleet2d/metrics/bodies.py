@@ -110,14 +110,18 @@ class Travel(Metric):
         }
 
 
+CHARGE_ENDS = (EventKind.CHARGED, EventKind.POWER_OFF)
+
+
 class BatteryUse(Metric):
     """Lowest charge, dockings a day, and shares of time charging and empty, of each robot.
 
     From the events `battery`, `docks` and `charged`. `lowest` is the lowest charge in these events:
     they happen at decisions, after a change of 5 %, when the robot docks, and when it is empty.
     `dockings` counts `docks`. `charging` is the share of the run's steps from a `docks` to the
-    `charged` after it, or to the end of the run; a robot at its charger charges at other times,
-    too. `empty` is the share of steps with an empty battery, until a script charges it again.
+    `charged` after it, to where it goes off, or to the end of the run; a robot at its charger
+    charges at other times, too. `empty` is the share of steps with an empty battery, until a script
+    charges it again.
     """
 
     unit = "share of time"
@@ -149,8 +153,8 @@ class BatteryUse(Metric):
                     self.empty[name] = self.empty.get(name, 0) + steps
             if event.event == EventKind.DOCKS:
                 self.dockings[name] = self.dockings.get(name, 0) + 1
-                self.docked_at[name] = event.step
-            elif event.event == EventKind.CHARGED and name in self.docked_at:
+                self.docked_at.setdefault(name, event.step)
+            elif event.event in CHARGE_ENDS and name in self.docked_at:
                 steps = event.step - self.docked_at.pop(name)
                 self.charging[name] = self.charging.get(name, 0) + steps
         self.steps = history.end
