@@ -1,4 +1,4 @@
-"""Expectations: what must hold over a run, with the first and last step of each violation.
+"""Expectations: conditions that must hold over a run, with their violations.
 
 ```python
 from fleet2d.expectations import always, after, distance, events, seen

@@ -28,10 +28,10 @@ INFINITE = float("inf")
 TINY = float(np.finfo(np.float64).tiny)
 
 Time = str | float | timedelta
-"""How long: text such as "2 min", seconds, or a timedelta."""
+"""A duration: text such as "2 min", seconds, or a timedelta."""
 MIXED = "mixed"
 WORDS: dict[str, Callable[..., Any]] = {}
-"""What a text may call, by name: the classes derived from `Word` with a name in small letters."""
+"""The classes that a text may call, by name: those derived from `Word` in small letters."""
 
 
 class Trace(NamedTuple):
@@ -191,7 +191,7 @@ def pulses(steps: I64, first: int, end: int) -> Trace:
 
 
 class Window(NamedTuple):
-    """A time that begins some time later and ends later still, both included: 1 min..2 min."""
+    """A time limit with a begin and an end, both included: 1 min..2 min later."""
 
     begin: timedelta
     end: timedelta
@@ -203,7 +203,7 @@ class RunSignals:
 
     Attributes:
         traces: The measured values, by the text of each signal.
-        words: For each signal with words: those that each of its values stands for, its name first.
+        words: For each signal of words, the words of each of its values, the name first.
         first: The first judged step.
         end: One past the last step that is known.
         ended: Whether the run is over.
@@ -218,11 +218,11 @@ class RunSignals:
     clock: Clock
 
     def beyond(self, neutral: float, *, high: bool, bounded: bool) -> float:
-        """Return the robustness that is assumed after the last known step.
+        """Return the robustness assumed after the last known step.
 
         Args:
             neutral: The neutral value of the operator.
-            high: Whether the best case is assumed for steps that aren't run, or the worst.
+            high: Whether the best case is assumed for steps still to come, or the worst.
             bounded: Whether the operator has a time limit, which may lie beyond the run's end.
         """
         if self.ended and not bounded:
@@ -234,7 +234,7 @@ class RunSignals:
         return micros(duration) // self.clock.step_us
 
     def reach(self, within: timedelta | Window | None) -> tuple[int, int]:
-        """Return how many steps later a time begins and ends; None is up to the run's end."""
+        """Return how many steps later a time limit begins and ends; None ends with the run."""
         if within is None:
             return 0, self.end - self.first
         if isinstance(within, Window):
@@ -244,7 +244,7 @@ class RunSignals:
 
 @dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(field,))
 class Term:
-    """A part of an expectation: a signal, or a condition. The terms that it has are its fields.
+    """A part of an expectation: a signal or a condition, whose fields hold further terms.
 
     Each class derived from it is a frozen dataclass.
     """
@@ -256,19 +256,19 @@ class Term:
         dataclass(frozen=True, eq=False)(cls)
 
     def parts(self) -> "Iterator[Term]":
-        """Yield the terms that it is made of."""
+        """Yield the terms that it consists of."""
         for each in fields(self):  # type: ignore[arg-type]
             if isinstance(value := getattr(self, each.name), Term):
                 yield value
 
     def named(self) -> "Iterator[str | Term]":
-        """Yield what names something in its signals, but not in the conditions that it has."""
+        """Yield the names in its signals, but not those in its conditions."""
         for part in self.parts():
             if not isinstance(part, Expectation):
                 yield from part.named()
 
     def with_name(self, old: "str | Term", new: str) -> Self:
-        """Return the same about another name."""
+        """Return a copy about another name."""
 
         def renamed(value: Any) -> Any:
             are_names = isinstance(value, str) and isinstance(old, str)
@@ -279,10 +279,10 @@ class Term:
         return self._rebuilt(renamed)
 
     def resolved(self, scene: "Scene") -> Any:
-        """Return the same about names of the run, in place of `anyone` and the like.
+        """Return a copy about names of the run, in place of `anyone` and the like.
 
-        A condition about `anyone` holds if it does for one person, that about `everyone` if it does
-        for all; that about `nearest(ana)` is about the one who is nearest at each step.
+        A condition about `anyone` holds if it does for one person, one about `everyone` if it does
+        for all; one about `nearest(ana)` is about the nearest body at each step.
 
         Raises:
             ScenarioError: There is nobody.
@@ -296,7 +296,7 @@ class Term:
         return replace(self, **changes) if changes else self  # type: ignore[type-var]
 
     def check(self, scene: "Scene") -> None:
-        """Refuse what the run doesn't have, part by part.
+        """Refuse names and signals that the run doesn't have, part by part.
 
         Raises:
             ScenarioError: A name is unknown, or the condition can never happen.
@@ -337,14 +337,14 @@ class Expectation(Term, ABC):
         """
 
     def resolved(self, scene: "Scene") -> "Expectation":
-        """Return the same about names of the run; see `Term.resolved`."""
+        """Return a copy about names of the run; see `Term.resolved`."""
         for name in self.named():
             if (meant := scene.meant(name, self)) is not None:
                 return meant.resolved(scene)
         return super().resolved(scene)
 
     def untested(self, run: RunSignals) -> str:
-        """Return why the run has put it to no test, for a message; empty if it has."""
+        """Return why the run didn't test it, for a message; empty if the run did."""
         return ""
 
     def occasions(self, run: RunSignals) -> I64:
@@ -361,7 +361,7 @@ class Expectation(Term, ABC):
         return And(self, _checked(other, "&"))
 
     def __or__(self, other: "Expectation") -> "Expectation":
-        """Expect one of the two, or both."""
+        """Expect at least one of both."""
         return Or(self, _checked(other, "|"))
 
     def __invert__(self) -> "Expectation":
@@ -422,7 +422,7 @@ class And(Expectation):
         return steps[self.robustness(run, False).values(steps) > 0]
 
     def untested(self, run: RunSignals) -> str:
-        """Return why one of the parts was not tested; of `Or`, if none was."""
+        """Return why one of the parts was not tested, or for `Or`, why none was."""
         reasons = [part.untested(run) for part in (self.one, self.other)]
         return "" if self.word == "or" and "" in reasons else "".join(reasons[:1]) or reasons[1]
 
@@ -468,9 +468,6 @@ def _checked(other: object, sign: str) -> Expectation:
     return other
 
 
-# Words
-
-
 class Word:
     """Base of the terms of expectations, in text and in Python.
 
@@ -487,7 +484,7 @@ class Word:
             WORDS[cls.__name__] = cls
 
     def __post_init__(self) -> None:
-        """Check that conditions are such, and read durations."""
+        """Check that conditions are conditions, and read durations."""
         for each in fields(self):  # type: ignore[arg-type]
             value = getattr(self, each.name)
             if each.type is Expectation and not isinstance(value, Expectation):

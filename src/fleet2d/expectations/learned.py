@@ -1,4 +1,4 @@
-"""Words for what a run has learned: numbers of the outputs of algorithms, and of metrics."""
+"""Words for learned values: numbers in the outputs of algorithms and in metrics."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -25,7 +25,7 @@ from fleet2d.floorplan.home import Home
 
 
 class _Value(NumberSignal):
-    """Base of numbers that change when algorithms or metrics are updated; missing before."""
+    """Base of numbers that algorithms or metrics update; missing before the first update."""
 
     path: str
 
@@ -44,7 +44,7 @@ class _Value(NumberSignal):
 
 
 class output(_Value):
-    """A number of an algorithm's newest output, which counts from the step after it.
+    """A number of an algorithm's newest output, which counts from the next step on.
 
     `ltp.kitchen` is the probability of a room by `ltp`; `rtp.ana.kitchen` that for one user;
     `mine.sightings` a named number of an output. Missing before the first output.
@@ -95,13 +95,13 @@ class output(_Value):
 
 
 class _Probability(output):
-    """A number of an output that is from 0 to 1."""
+    """A number of an output, from 0 to 1."""
 
     between = (0.0, 1.0)
 
 
 def probability(algorithm: str, room: str, user: str | None = None) -> output:
-    """Return an algorithm's probability of a room, for a user if it has one for each."""
+    """Return an algorithm's probability of a room, for a user if it has one per user."""
     return _Probability(".".join(part for part in (algorithm, user, room) if part))
 
 
@@ -156,9 +156,9 @@ class metric(_Value):
 
 
 class likeliest(WordSignal):
-    """The likeliest room by an algorithm's latest output: for one user, or of all its rows.
+    """The likeliest room by an algorithm's latest output, for one user or over all rows.
 
-    None before the first output.
+    No room before the first output.
     """
 
     algorithm: str
@@ -188,7 +188,7 @@ class likeliest(WordSignal):
         return constant(gauge.now, block.first, block.end)
 
     def learn(self, outputs: Outputs, results: Results, gauge: Gauge) -> None:
-        """Take the room from a new output of the algorithm, the first of equals.
+        """Take the likeliest room from a new output of the algorithm, the first if tied.
 
         Raises:
             ScenarioError: The output has no numbers of rooms, or none for the user.

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from fleet2d.configuration.problems import did_you_mean, problem
 from fleet2d.errors import InputError, errors_as
 
-# Their classes are the words of texts.
+# These modules define the words of texts.
 from fleet2d.expectations import learned as learned
 from fleet2d.expectations import temporal as temporal
 from fleet2d.expectations import vocabulary as vocabulary
@@ -51,7 +51,7 @@ _QUANTITY = re.compile(
     r"""|(?P<time>\d{1,2}:\d\d(?:\s*-\s*\d{1,2}:\d\d)?)"""
     rf"""|(?<![\w.])(?P<number>(?:{_NUMBER}\s*{_UNIT}?\s*\.\.\s*)?{_NUMBER}\s*{_UNIT})"""
 )
-# Answers to requests, as in `remind(ana) accepted within 30 min`, which are calls of `answered`.
+# Answers to requests, as in `remind(ana) accepted within 30 min`, become calls of `answered`.
 _ANSWERED = re.compile(
     r"(\w+)\s*\(([^(),]+)\)\s+(?!(?:and|or|in|not|is|if|else)\b)([a-z_]+)\b"
     r"(?:\s+within\s+([^),&|]+?)(?=\s*(?:$|[),&|])|\s+(?:and|or)\b))?"
@@ -60,7 +60,7 @@ _LONGEST = 2000
 _DEEPEST = 40
 
 
-# Spellings of other languages, and their form here.
+# Spellings of other languages, with the form for Python.
 _SLIPS = (
     (r"\s*=>\s*", " >= "), (r"\s*=<\s*", " <= "), (r"(?<=\))\s*=\s*(?!=)", " == "),
     (r"\s*&&\s*", " and "), (r"\s*\|\|\s*", " or "),
@@ -226,7 +226,7 @@ class Expected(NamedTuple):
     """An expectation of a scenario.
 
     Attributes:
-        that: What must hold.
+        that: The expectation.
         covers: The requirements that it covers, such as "REQ-12".
     """
 
@@ -243,7 +243,7 @@ def read_expected(value: Any) -> Expected:
     """Read an entry of the section `expect` of a scenario.
 
     Raises:
-        PydanticCustomError: It can't be read, or doesn't say when it must hold.
+        PydanticCustomError: The entry can't be read, or doesn't say when it must hold.
 
     Example:
         >>> read_expected({"that": "never(moving(ana))", "covers": ["REQ-12"]}).covers
@@ -276,7 +276,7 @@ def read_requirements(value: Any) -> tuple[str, ...]:
     """Read a list of requirements.
 
     Raises:
-        InputError: It isn't one.
+        InputError: The value is no list of requirements.
     """
     is_list = isinstance(value, list | tuple)
     if not is_list or not all(isinstance(text, str) and text.strip() for text in value):

@@ -1,7 +1,7 @@
-"""Signals: what is measured in a run at each step, as numbers, words or truth values.
+"""Signals: measurements of a run at each step, as numbers, words or truth values.
 
 A signal is one class: its word, the names that it may use (of a `Scene`), and its measurement over
-a block of steps. Those that there are stand in `fleet2d.expectations.vocabulary`.
+a block of steps. The signals themselves are in `fleet2d.expectations.vocabulary`.
 """
 
 import operator
@@ -53,16 +53,13 @@ QUANTIFIERS: Mapping[str, Callable[[Any, Any], Any]] = {
     "anyone": operator.or_,
     "everyone": operator.and_,
 }
-"""What names one of the users, or all of them, and how conditions about them are combined."""
+"""Words for one or all of the users, and the operators that combine conditions about each."""
 QUANTITIES = {"m": LENGTH, "m/s": SPEED, "share": SHARE}
-"""How the limits of a signal are written, by its unit; limits of others are plain numbers."""
+"""The quantities in which limits are written, by the unit of the signal; others are plain."""
 
 Limits = tuple[float, float]
 """The least and the largest value that a signal can have."""
 ANY_NUMBER: Limits = (-INFINITE, INFINITE)
-
-
-# Names
 
 
 @dataclass(frozen=True)
@@ -70,17 +67,17 @@ class Scene:
     """The names of a run that expectations may use, to check them before the run.
 
     Attributes:
-        names: The names, by what they name: users, robots, rooms (also their types), things of the
-            home, doors, sensors, algorithms, metrics, batteries (the robots that have one), and
-            bodies (users and robots).
+        names: The names of each kind: users, robots, rooms (also their types), things of the home,
+            doors, sensors, algorithms, metrics, batteries (the robots that have one), and bodies
+            (users and robots).
         cameras: For each body with cameras, the names of the bodies that they look at.
         events: The kinds of events that can happen to each entity; an empty name is the home.
         details: The details that events of a kind can have, where they are known, by the kind; of
             activities for each user.
         bounds: The least and the greatest coordinates of the home (x, y, x, y) [m].
         remaining: Time from now to the end of the run.
-        interactions: What robots want of people, by name.
-        limits: For each metric, what returns the least and the largest value of a number of it.
+        interactions: The interactions of robots with people, by name.
+        limits: For each metric, a function that returns the limits of one of its numbers.
         notes: Notes for readers: kinds of rooms that the home doesn't have, and comparisons whose
             outcome is certain.
     """
@@ -114,10 +111,10 @@ class Scene:
         return reduce(operator.or_, cases)
 
     def check_room(self, name: str, of: object, others: Iterable[str] = ()) -> None:
-        """Refuse an unknown room; a kind of room that this home doesn't have is noted.
+        """Refuse an unknown room; note a kind of room that this home lacks.
 
         Raises:
-            ScenarioError: It is neither a room nor a kind of rooms, nor among the others.
+            ScenarioError: The name is neither a room nor a kind of rooms, nor among the others.
         """
         known = [*others, *self.names["rooms"]]
         kind = name.removeprefix(ANY_KIND)
@@ -169,24 +166,21 @@ class Scene:
             )
         if detail is None or detail.startswith("come "):
             return
-        own = f"{kind} {entity}"  # such as the activities of one user
+        own = f"{kind} {entity}"  # activities differ between users
         known = self.details.get(own if own in self.details else kind)
         if known is not None and detail:
             self.check_name(f"{kind} with the detail", detail, known, of)
 
 
-# Measuring
-
-
 class MeasuredCameras(Protocol):
-    """The cameras of a body, as signals are measured by them."""
+    """The cameras of a body, by which signals are measured."""
 
     index: int
     """The number of the owner among the robots, or among the users."""
 
     @property
     def other_names(self) -> Sequence[str]:
-        """The names of the bodies that they look at, by their numbers."""
+        """The names of the bodies in view of the cameras, by number."""
 
     @property
     def in_view(self) -> Mapping[str, object]:
@@ -257,7 +251,7 @@ class SignalBlock:
 Outputs = Mapping[str, Any]
 """New outputs of algorithms, by name."""
 Results = Mapping[str, Callable[[], Any]]
-"""What returns the new result of a metric, by name."""
+"""Functions that return the new results of metrics, by name."""
 
 
 class Gauge:
@@ -265,8 +259,8 @@ class Gauge:
 
     Attributes:
         signal: The signal.
-        memory: What its `measure` needs from block to block; see `Measurement.start`.
-        now: The latest value, of signals that only change now and then; NaN: it is missing.
+        memory: The state of its `measure` from block to block; see `Measurement.start`.
+        now: The latest value of a signal that rarely changes; NaN: it is missing.
         words: The words that each value stands for, if the signal consists of words.
     """
 
@@ -300,10 +294,10 @@ class Gauge:
 
 
 class Measurement(Word, Term):
-    """Base of what is measured during a run; signals of the same text are the same signal.
+    """Base of signals that are measured during a run; those with equal texts are the same.
 
     Attributes:
-        of: What the first field names: as a noun for messages, and in `Scene.names`; or nothing.
+        of: The noun for the first field in messages, and its key in `Scene.names`; or nothing.
     """
 
     of: ClassVar[tuple[str, str] | None] = None
@@ -333,7 +327,7 @@ class Measurement(Word, Term):
             scene.check_name(noun, getattr(self, fields(self)[0].name), scene.names[known], self)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return what `measure` needs from block to block, before the first one."""
+        """Return the initial state of `measure`."""
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
         """Return the values over a block of steps."""
@@ -347,9 +341,6 @@ class Measurement(Word, Term):
 
     def finish(self, results: Mapping[str, Any], gauge: Gauge) -> None:
         """Note the results of metrics over the whole run, which count at its last step."""
-
-
-# Kinds of signals
 
 
 def _comparison(sign: str) -> Callable[["Signal", Any], Expectation]:
@@ -408,7 +399,7 @@ class NumberSignal(Measurement, Signal):
 
 
 def operand_text(value: "float | Signal", unit: str) -> str:
-    """Return a number or a signal as it stands in an expression."""
+    """Return the text of a number or a signal within an expression."""
     return str(value) if isinstance(value, Signal) else number_text(value, unit)
 
 
@@ -417,7 +408,7 @@ def _limits_of(value: "float | Signal", scene: Scene) -> Limits:
 
 
 def _range_text(signal: "Signal", limits: Limits) -> str:
-    """Return between which values a signal is, for messages."""
+    """Return the limits of a signal in words, for messages."""
     low, high = limits
     if high == INFINITE:
         return f"{signal} is {number_text(low, signal.unit)} or more"
@@ -458,7 +449,7 @@ class Arithmetic(Signal):
         return "" if self.sign == "/" and len(set(units)) == 1 and len(units) == 2 else MIXED
 
     def limits(self, scene: Scene) -> Limits:
-        """Return the least and the largest result; of quotients nothing is known."""
+        """Return the least and the largest result; quotients are unlimited."""
         if self.sign == "/":
             return ANY_NUMBER
         ends = product(_limits_of(self.one, scene), _limits_of(self.other, scene))
@@ -493,7 +484,7 @@ class SignalComparison(Expectation):
 
     signal: Signal
     sign: str
-    limit: Any  # as it is written, then a number or a signal
+    limit: Any  # text at first, then a number or a signal
 
     is_call = False
 
@@ -510,7 +501,7 @@ class SignalComparison(Expectation):
         return self.signal.unit or "1"
 
     def check(self, scene: Scene) -> None:
-        """Refuse what the run doesn't have; note a comparison that always holds, or never."""
+        """Refuse signals that the run lacks; note a comparison that always or never holds."""
         super().check(scene)
         low, high = self.signal.limits(scene)
         least, largest = _limits_of(self.limit, scene)
@@ -554,7 +545,7 @@ def _number(value: object, unit: str, beside: object) -> float:
     """Return a number in the unit of the signal beside it.
 
     Raises:
-        InputError: It can't be read, or isn't a share from 0 to 1.
+        InputError: The number can't be read, or isn't a share from 0 to 1.
     """
     try:
         if unit in QUANTITIES:
@@ -583,13 +574,13 @@ class WordSignal(Measurement):
     """A word at each step, such as a room; compare it by `==`, `!=` and `is_in`.
 
     Attributes:
-        noun: What its words name, such as "room".
+        noun: The noun for its words, such as "room".
     """
 
     noun: ClassVar[str]
 
     def __eq__(self, word: object) -> Expectation:  # type: ignore[override]
-        """Expect the signal to be a word, or that of another signal."""
+        """Expect the signal to be a word, or the word of another signal."""
         return SameWord(self, word) if isinstance(word, WordSignal) else self.is_in(word)
 
     def __ne__(self, word: object) -> Expectation:  # type: ignore[override]
@@ -612,7 +603,7 @@ class WordSignal(Measurement):
         """Return the bodies that it can stand for.
 
         Raises:
-            ScenarioError: It doesn't stand for a body.
+            ScenarioError: The signal doesn't stand for a body.
         """
         raise ScenarioError(f"{self} is not a body: expected a name, or nearest(…)")
 
@@ -646,7 +637,7 @@ class WordComparison(Expectation):
 
 
 class SameWord(Expectation):
-    """The condition that two signals have the same word; without a word none has."""
+    """The condition that two signals have the same word; two missing words don't count."""
 
     one: WordSignal
     other: WordSignal

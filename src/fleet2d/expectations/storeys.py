@@ -1,4 +1,4 @@
-"""Storeys: they lie side by side in a plan, so that what is near there may be far away."""
+"""Storeys, which lie side by side in a plan, so that near places may be far apart."""
 
 import numpy as np
 import shapely
@@ -16,9 +16,9 @@ def storey_of(plan: FloorPlan, place: shapely.Geometry) -> int:
 
 
 def _storey_of_part(plan: FloorPlan) -> I64:
-    """Return for each part of the free space the number of one to which stairs lead, the nearest.
+    """Return the storey of each part of the free space: the number of the nearest part with stairs.
 
-    A part that nothing joins, such as a garage, is beside the rest of its storey.
+    A separate part, such as a garage, lies beside the rest of its storey.
     """
     parts = np.array(plan.polygons)
     ends = shapely.points(plan.portal_ends[:, :4].reshape(-1, 2))
@@ -41,7 +41,7 @@ def storeys(block: SignalBlock, row: int) -> Trace:
 
 
 def only_on(storey: int, distance: Trace, block: SignalBlock, row: int) -> Trace:
-    """Return the distance of a body from a place on a storey: from others it is infinite."""
+    """Return the distance of a body from a place on a storey; infinite from other storeys."""
 
     def masked(metres: F64, number: F64) -> F64:
         return np.where(number == storey, metres, INFINITE)
@@ -50,7 +50,7 @@ def only_on(storey: int, distance: Trace, block: SignalBlock, row: int) -> Trace
 
 
 def apart(block: SignalBlock, row: int, other: int) -> Trace:
-    """Return the distance between two bodies [lattice]: on two storeys it is infinite."""
+    """Return the distance between two bodies [lattice]; infinite between storeys."""
     window = block.bodies.window(block.first, block.end)
     distance = Trace(*distances_between(window, row, other), block.end)
     if not block.home.plan.portals:

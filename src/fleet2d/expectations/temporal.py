@@ -78,18 +78,18 @@ class Temporal(Expectation):
         return [] if value > 0 else [Violation(run.first, last, value, last)]
 
     def last(self, run: RunSignals) -> int:
-        """Return the last step that the judgement depends on and that has been simulated."""
+        """Return the last simulated step on which the judgement depends."""
         return run.end - 1
 
     def slack(self, run: RunSignals) -> int | None:
-        """Return the steps to spare when it was fulfilled, below 0 if late; None: no limit."""
+        """Return the steps to spare at fulfilment, below 0 if late; None without a limit."""
         return None
 
 
 class Windowed(Word, Expectation):
     """Base of expectations about a window before or after each step: `within`, or all time."""
 
-    within: Any = field(default=None, kw_only=True)  # as it is written, then a timedelta or Window
+    within: Any = field(default=None, kw_only=True)  # text at first, then a timedelta or Window
 
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""
@@ -136,7 +136,7 @@ class Invariant(Limited):
         return violations_of(self.operand.robustness(run, True).until(end).since(first))
 
     def untested(self, run: RunSignals) -> str:
-        """Return why there was nothing to expect: its hours, or its condition, never came."""
+        """Return why nothing was tested, such as that its hours or its condition never came."""
         texts = []
         first = run.first + run.reach(self.within)[0]
         for premise in premises(self.operand):
@@ -179,11 +179,11 @@ class eventually(Limited):
         return self.part.robustness(run, high).sliding_max(low, high_end, -INFINITE, after)
 
     def slack(self, run: RunSignals) -> int | None:
-        """Return how many steps before the time limit it was fulfilled."""
+        """Return the number of steps between fulfilment and time limit."""
         return self.least_slack([run.first], run)
 
     def least_slack(self, steps: Sequence[int], run: RunSignals) -> int | None:
-        """Return how many steps before the time limit it was fulfilled, on the worst occasion.
+        """Return the steps between fulfilment and time limit on the worst occasion.
 
         Args:
             steps: The steps from which the time counts.
@@ -249,7 +249,7 @@ def _until(hold: Trace, goal: Trace, reach: tuple[int, int] | None, after: float
     """Return the robustness of "`hold` until `goal`" from each step on.
 
     Args:
-        hold: What holds before the goal.
+        hold: The condition before the goal.
         goal: The goal, over the same steps.
         reach: How many steps later the goal is due, at first and at last; None: some time.
         after: Value that is assumed from the end on.
@@ -273,14 +273,14 @@ class since(Windowed):
     goal: Expectation
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
-        """Return the robustness of `until` for the time that runs backward."""
+        """Return the robustness of `until` in reversed time."""
         hold, goal = (part.robustness(run, high).reversed for part in (self.hold, self.goal))
         reach = None if self.within is None else run.reach(self.within)
         return _until(hold, goal, reach, -INFINITE).reversed
 
 
 def found(body: str, by: str) -> Expectation:
-    """Return whether a robot finds a person, and not somebody else whom it takes for the person.
+    """Return the expectation that a robot finds a person, and nobody else it takes for the person.
 
     The search may end some steps after the sighting, when the robot has turned away already: so the
     person must truly have been in its view since it began to count the person as seen. What the
@@ -297,7 +297,7 @@ WORDS[found.__name__] = found
 
 
 class once(Windowed):
-    """The condition that a condition has held at some step up to this one, or `within` the last."""
+    """The condition that `part` has held at some step up to this one, or `within` the last."""
 
     part: Expectation
 
@@ -330,8 +330,8 @@ def premises(operand: Term) -> list[Expectation]:
 class after(Limited):
     """Expect a condition each time that `trigger` begins: immediately, or `within` some time.
 
-    Each event counts by itself; conditions that last, such as being in a room, count each time that
-    they begin. Occasions whose time isn't over when the run ends don't count.
+    Each event counts by itself; lasting conditions, such as being in a room, count each time that
+    they begin. Occasions whose time limit is beyond the run don't count.
     """
 
     trigger: Expectation
@@ -354,7 +354,7 @@ class after(Limited):
         return np.unique(self.trigger.occasions(run))
 
     def judged(self, run: RunSignals) -> I64:
-        """Return those at which the rest of the run can't change whether the condition holds."""
+        """Return the steps of occasions whose outcome the rest of the run can't change."""
         steps = self.triggered(run)
         best, worst = (self.consequence.robustness(run, high) for high in (True, False))
         return steps[(best.values(steps) < 0) | (worst.values(steps) > 0)]
@@ -390,7 +390,7 @@ class after(Limited):
         return violations
 
     def slack(self, run: RunSignals) -> int | None:
-        """Return how many steps before the time limit it was fulfilled, on the worst occasion."""
+        """Return the steps between fulfilment and time limit on the worst occasion."""
         expected = self.consequence
         if not isinstance(expected, eventually):
             return None
@@ -400,11 +400,11 @@ class after(Limited):
 class answered(Limited):
     """Expect an answer to each request that comes up: `remind(ana) accepted within 30 min`.
 
-    Without `within` there is time for it as long as the request is open.
+    Without `within`, there is time for an answer as long as the request is open.
 
     Attributes:
         interaction: An interaction by its name, or all of a kind, such as `remind`.
-        person: The person to whom it is.
+        person: The person who is asked.
         outcome: The answer, or `delivered`.
     """
 
@@ -417,7 +417,7 @@ class answered(Limited):
         check_known(self.outcome, "answer", ANSWERS, InputError, "answered: ")
 
     def resolved(self, scene: Scene) -> Expectation:
-        """Return what is expected of each of the interactions.
+        """Return the expectations for each of the interactions, combined.
 
         Raises:
             ScenarioError: There is no such interaction, or none with that person.
@@ -440,7 +440,7 @@ class answered(Limited):
         return reduce(operator.and_, expected)
 
     def robustness(self, run: RunSignals, high: bool) -> Trace:
-        """Not defined: what is expected depends on the interactions of the run."""
+        """Not defined, as `resolved` replaces this expectation by those for interactions."""
         raise NotImplementedError(f"{self} is judged as `resolved` returns it")
 
 
@@ -448,7 +448,7 @@ class holds_for(Word, Expectation):
     """True at steps up to which a condition has held for at least `duration`."""
 
     part: Expectation
-    duration: Any  # of type Time, then a timedelta
+    duration: Any  # a Time at first, then a timedelta
 
     def check(self, scene: Scene) -> None:
         """Refuse a time beyond the run."""
@@ -462,9 +462,9 @@ class holds_for(Word, Expectation):
 
 
 class Total(Word, Signal):
-    """Base of what is summed over the present hour, day or week, or over the run so far.
+    """Base of sums over the present hour, day or week, or over the run so far.
 
-    Compared outside of any time operator, it counts at the end of the run.
+    Outside of any time operator, a sum counts at the end of the run.
     """
 
     part: Expectation
@@ -485,18 +485,18 @@ class Total(Word, Signal):
         return joined([sum_in(a, b) for a, b in pairwise(edges)])
 
     def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
-        """Return a function that sums over the steps from one to before another."""
+        """Return a function that sums over the steps from `first` to `end` - 1."""
         raise NotImplementedError
 
 
 class count(Total):
-    """How often a condition has begun: in the present hour, day or week, or in the run so far."""
+    """The number of times a condition has begun: in the present hour, day or week, or so far."""
 
     unit = "times"
     between = (0.0, INFINITE)
 
     def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
-        """Return how many occasions have passed."""
+        """Return a function that counts occasions."""
         steps = np.sort(self.part.occasions(run))
 
         def count_in(first: int, end: int) -> Trace:
@@ -510,7 +510,7 @@ class count(Total):
 class share(Total):
     """The share of the time in which a condition holds: in the present period, or so far.
 
-    With `of`, only the time in which that condition holds counts; missing before there is some.
+    With `of`, only the time in which that condition holds counts; missing before its first step.
     """
 
     of: Expectation | None = field(default=None, kw_only=True)
@@ -519,7 +519,7 @@ class share(Total):
     between = (0.0, 1.0)
 
     def sums(self, run: RunSignals) -> Callable[[int, int], Trace]:
-        """Return the share of the steps that have passed."""
+        """Return a function that returns shares of steps."""
         part = self.part if self.of is None else self.part & self.of
         steps = np.arange(run.first, run.end, dtype=np.int64)
         holds = part.robustness(run, False).values(steps) > 0
@@ -577,11 +577,11 @@ class at_most(Invariant):
                 "at_most: the number of times must be a whole number, 0 or more, not"
                 f" {self.times!r}"
             )
-        _ = self.operand  # which checks `per`
+        _ = self.operand  # checks `per`
 
     @property
     def operand(self) -> Expectation:
-        """The condition that it hasn't begun more often."""
+        """The condition that `part` hasn't begun more often."""
         return count(self.part, per=self.per) <= self.times
 
 
@@ -597,7 +597,7 @@ def _period_begins(run: RunSignals, per: str | None) -> list[int]:
         moment = next_reading(moment, _period_of(moment, per) + PERIODS[per])
         if (step := clock.step_at_or_after(clock.elapsed(moment))) >= run.end:
             return steps
-        # The clock may have been changed before: back into a period, or into the next one.
+        # The clock may have been changed before, back into a period or on into the next one.
         period = _period_of(moment, per)
         is_new = period > latest or (per == "hour" and not moment.minute)
         latest = max(latest, period)
@@ -606,7 +606,7 @@ def _period_begins(run: RunSignals, per: str | None) -> list[int]:
 
 
 def _period_of(moment: datetime, per: str) -> datetime:
-    """Return what the clock read as the hour, day or week of a moment began."""
+    """Return the local time at which the hour, day or week of a moment began."""
     if per == "hour":
         return written(moment).replace(minute=0, second=0, microsecond=0)
     midnight = midnight_of(moment)

@@ -40,14 +40,13 @@ class Verdict:
             and empty for conditions that are only true or false.
         slack_s: With a time limit: time to spare on the worst occasion [s]; below 0 if it was late,
             by at least that much if it never happened. None without a time limit.
-        occasions: How often the trigger of `after` happened, as far as that was judged; None for
-            other expectations.
+        occasions: The number of judged occasions of `after`; None for other expectations.
         violations: The violations, in order of time.
         first: The first judged step.
         end: One past the last step that is known.
         clock: The clock of the run.
         untested: Why the run didn't put it to the test, such as that its trigger never happened.
-        may_be_untested: Whether that is all right.
+        may_be_untested: Whether it may remain untested.
         notes: Notes on it, such as that the home lacks a kind of rooms.
     """
 
@@ -150,7 +149,7 @@ class SignalCourse(NamedTuple):
         text: The signal, or a condition that is 1 while it holds.
         unit: Its unit; empty for plain numbers and conditions.
         trace: Its values.
-        limit: What it is compared with; None for a condition, or if that is a signal, too.
+        limit: The limit of the comparison; None for a condition, or if it is a signal, too.
     """
 
     text: str
@@ -160,7 +159,7 @@ class SignalCourse(NamedTuple):
 
 
 class VerdictEvidence(NamedTuple):
-    """What an expectation is about, for pictures.
+    """The signals and names in an expectation, for pictures.
 
     Attributes:
         signals: Its signals.
@@ -174,7 +173,7 @@ class VerdictEvidence(NamedTuple):
 
 
 def evidence_of(expectation: Expectation, run: RunSignals) -> VerdictEvidence:
-    """Return what an expectation is about, with the signals of a run."""
+    """Return the evidence for an expectation from the signals of a run."""
     courses: dict[str, SignalCourse] = {}
     places: set[str] = set()
     for atom in _atoms(expectation):
@@ -194,7 +193,7 @@ def evidence_of(expectation: Expectation, run: RunSignals) -> VerdictEvidence:
 
 
 def _atoms(expectation: Expectation) -> Iterator[Expectation]:
-    """Yield the conditions that an expectation is made of."""
+    """Yield the elementary conditions of an expectation."""
     parts = [part for part in expectation.parts() if isinstance(part, Expectation)]
     for part in parts:
         yield from _atoms(part)
@@ -203,7 +202,7 @@ def _atoms(expectation: Expectation) -> Iterator[Expectation]:
 
 
 def verdict_of(name: str, expectation: Expectation, run: RunSignals, text: str = "") -> Verdict:
-    """Return the verdict on an expectation from the signals of a run; `text` is how it was put."""
+    """Return the verdict on an expectation from the signals of a run; `text` is its wording."""
     best = expectation.robustness(run, True).at(run.first)
     worst = best if run.ended else expectation.robustness(run, False).at(run.first)
     slack = expectation.slack(run) if isinstance(expectation, Temporal) else None
@@ -253,7 +252,7 @@ def check_judged(expectation: object) -> Expectation:
     """Return the expectation if it has a time operator; sums count at the end without one.
 
     Raises:
-        InputError: It doesn't, or it is not an expectation.
+        InputError: It has no time operator, or is no expectation.
     """
     if not isinstance(expectation, Expectation):
         raise InputError(

@@ -1,4 +1,4 @@
-"""The terms for what is measured in a run: one class each, named as in expectations.
+"""The terms for signals of a run: one class each, named as in expectations.
 
 To add a word, derive a class from `NumberSignal`, `WordSignal` (a name) or `Condition`: its
 fields are its arguments, `check` refuses names that a run doesn't have, and `measure` returns its
@@ -63,19 +63,16 @@ Target = str | tuple[float, float] | WordSignal
 BODY = ("user or robot", "bodies")
 """A noun for messages, and what it names in `Scene.names`."""
 
-# The charge of a battery is rounded down to thousandths; errors of floats must not lower it.
+# The charge of a battery is rounded down to thousandths, unless it is below by a rounding error.
 PARTS = 1000
 ROUNDING = 1e-9
-
-
-# Numbers
 
 
 class distance(NumberSignal):
     """The distance of a body from another, a room, an object or a point [m].
 
-    It is measured from the centre of a body to the nearest point of a room or object: 0 inside.
-    Infinite while a body is away from home, or on another storey.
+    The distance is measured from the centre of a body to the nearest point of a room or object; it
+    is 0 inside, and infinite while a body is away from home or on another storey.
     """
 
     body: str
@@ -112,7 +109,7 @@ class distance(NumberSignal):
             raise ScenarioError(f"{self}: give two different bodies")
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return the rows of both bodies, the second None if it is a place; and its outline."""
+        """Return the rows of both bodies, the second None for a place, and the place."""
         names = [actor.name for actor in run.actors]
         other = names.index(str(self.other)) if self.other in names else None
         return run.row(self.body), other, None, None
@@ -153,7 +150,7 @@ class distance(NumberSignal):
     def _sides(
         cls, home: Home, shape: PlacedObject | list[int] | tuple[float, float]
     ) -> list[tuple[int | None, I64]]:
-        """Return the edges of a place on each storey, with its number; None: there is only one."""
+        """Return the edges of a place on each storey, with its number, or None for only one."""
         plan = home.plan
         if not plan.portals or shape == []:
             return [(None, cls._edges(home, shape))]
@@ -199,20 +196,20 @@ def _borders(cells: Bool) -> list[list[int]]:
     """Return the borders after rows of padded cells: row, first column, one past the last."""
     differ = np.pad(cells[1:] != cells[:-1], ((0, 0), (1, 1)))
     row, column = np.nonzero(differ[:, 1:] != differ[:, :-1])
-    # Columns are shifted by 1, as the cells themselves were padded.
+    # Columns are shifted by 1, as the cells were padded.
     ends = column.reshape(-1, 2) - 1
     return np.column_stack([row[::2], ends]).tolist()
 
 
 class _Motion(Measurement):
-    """Base of signals of the way of a body from step to step."""
+    """Base of signals of the motion of a body from step to step."""
 
     body: str
 
     of = BODY
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return its row, its pose at the step before, and the steps in a second."""
+        """Return the row of the body, its pose at the step before, and the steps in a second."""
         row = run.row(self.body)
         before = np.zeros(0, np.int64)
         # The present pose stands for the one before, which may be forgotten.
@@ -237,17 +234,17 @@ def _pose(pose: Any) -> I64:
 class speed(_Motion, NumberSignal):
     """The speed of a body: the distance from its position at the step before, per step [m/s].
 
-    It is 0 while somebody passes from the one end of stairs or a lift to the other.
+    It is 0 on the way from one end of stairs or a lift to the other.
 
     Positions are whole lattice units, so that a step may be a little longer than the body's own
-    speed, or its speed in a slow area, allows: such a step is at that speed.
+    speed, or its speed in a slow area, allows; such a step counts as made at that speed.
     """
 
     unit = "m/s"
     between = (0.0, INFINITE)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return the body's own speed, and the memory of its way."""
+        """Return the body's own speed, and the state of its motion."""
         usual = run.actors[run.row(self.body)].entity.speed
         return usual, super().start(run, gauge)
 
@@ -283,7 +280,7 @@ class battery(NumberSignal):
     between = (0.0, 1.0)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return the course of the charge along each plan, so far the present one."""
+        """Return the course of the charge along each plan, at first along the present one."""
         actor = run.actors[run.row(self.robot)]
         assert actor.charge is not None
         return [actor.charge.course(actor.motion)], run.clock.step_us
@@ -311,13 +308,10 @@ class battery(NumberSignal):
         return shortest(np.arange(block.first, block.end), charge, block.end)
 
 
-# Names
-
-
 class room(WordSignal):
-    """The room that a body is in, for `room("ana") == "kitchen"`: a name or a type.
+    """The room of a body, for `room("ana") == "kitchen"`, by name or type.
 
-    No name between two rooms, or away.
+    There is no word between two rooms or away from home.
     """
 
     body: str
@@ -335,7 +329,7 @@ class room(WordSignal):
         return run.row(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return the index of the room at each step; -1 if the body is in none or away."""
+        """Return the index of the room at each step; -1 in no room or away."""
         runs = block.bodies.runs(gauge.memory, block.first, block.end)
         index = rooms_at(block.home.plan.room_of_place, runs.x, runs.y)
         return shortest(runs.step, np.where(runs.away != 0, -1.0, index), block.end)
@@ -371,7 +365,7 @@ class activity(WordSignal):
 
 
 class power(WordSignal):
-    """Whether a robot is on, for `power("astro") == "on"`; else why it went off: its state."""
+    """The state of a robot's power, for `power("astro") == "on"`, or else why it is off."""
 
     robot: str
 
@@ -379,7 +373,7 @@ class power(WordSignal):
     noun = "state of power"
 
     def check_word(self, word: str, scene: Scene) -> None:
-        """Refuse another state than those of the intervention `power`."""
+        """Refuse states other than those of the intervention `power`."""
         scene.check_name("state of power", word, get_args(PowerState), self)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
@@ -398,7 +392,7 @@ class power(WordSignal):
 
 
 def _code(word: str, gauge: Gauge) -> float:
-    """Return the value that stands for a word; a new one at its first use."""
+    """Return the number of a word, a new number at its first use."""
     code = next((code for code, words in gauge.words.items() if word in words), len(gauge.words))
     gauge.words.setdefault(code, (word,))
     return float(code)
@@ -407,7 +401,8 @@ def _code(word: str, gauge: Gauge) -> float:
 class nearest(WordSignal):
     """The robot that is nearest to a user, or the user who is nearest to a robot.
 
-    It can also stand for a body: `room(nearest(ana)) == room(ana)`. None while all are away.
+    It can also stand for a body: `room(nearest(ana)) == room(ana)`. It has no word while all are
+    away.
     """
 
     body: str
@@ -431,7 +426,7 @@ class nearest(WordSignal):
         scene.check_name("body", word, self.choices(scene), self)
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return the rows of the body and of those that it may be near to."""
+        """Return the rows of the body and of the candidates."""
         row = run.row(self.body)
         is_user = type(run.actors[row].entity)
         rows = [i for i, actor in enumerate(run.actors) if not isinstance(actor.entity, is_user)]
@@ -439,7 +434,7 @@ class nearest(WordSignal):
         return row, rows
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return the row of the nearest one, the first of equals; -1 if there is none."""
+        """Return the row of the nearest body, the first if tied; -1 if there is none."""
         row, rows = gauge.memory
         traces = [apart(block, row, other) for other in rows]
 
@@ -451,11 +446,8 @@ class nearest(WordSignal):
         return combine(first_of, *traces)
 
 
-# Conditions
-
-
 class moving(_Motion, Condition):
-    """Whether a body's position differs from that at the step before."""
+    """Whether the position of a body differs from its position at the step before."""
 
 
 class away(Condition):
@@ -470,7 +462,7 @@ class away(Condition):
         return run.row(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return 1 while it is away."""
+        """Return 1 while the body is away."""
         runs = block.bodies.runs(gauge.memory, block.first, block.end)
         return shortest(runs.step, (runs.away != 0).astype(np.float64), block.end)
 
@@ -504,11 +496,11 @@ class seen(_CameraCondition):
     """Whether a camera's owner counts a body as seen: from `user_seen` until `user_lost`."""
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Begin with whether it counts as seen at present."""
+        """Begin with 1 if the body counts as seen at present."""
         gauge.now = float(self.body in run.cameras[self.by].in_view)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return 1 while it counts as seen."""
+        """Return 1 while the body counts as seen."""
         changes = (
             (event.step, float(event.event in SEEN_EVENTS))
             for event in block.events
@@ -521,12 +513,12 @@ class in_view(_CameraCondition):
     """Whether a body truly is in view of a camera, noticed or not."""
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Return cameras that make no errors; so far they have seen nobody."""
+        """Return cameras without errors, which have seen nobody yet."""
         gauge.now = 0.0
         return run.cameras[self.by].perfect(run.first)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return 1 while it is in view."""
+        """Return 1 while the body is in view."""
         looks = gauge.memory.look(block.bodies, block.end)
         changes = ((e.step, float(e.event in SEEN_EVENTS)) for e in looks if e.detail == self.body)
         return gauge.switched(block, changes)
@@ -546,7 +538,7 @@ class perceived(_CameraCondition):
         return cameras.index, cameras.other_names.index(self.body)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return the number of observations at each step at which there is one."""
+        """Return the number of observations at each step."""
         seen = block.observations
         robot, user = gauge.memory
         columns = seen.distinct
@@ -566,12 +558,12 @@ class door(Condition):
         return list(run.doors).index(self.name)
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return 1 while it is open."""
+        """Return 1 while the door is open."""
         return constant(float(gauge.memory not in block.home.shut), block.first, block.end)
 
 
 class light(Condition):
-    """Whether the light of a room is on; of a kind of rooms, whether any of them is."""
+    """Whether the light of a room is on, or of any room of a kind."""
 
     name: str
 
@@ -585,7 +577,7 @@ class light(Condition):
         return {room.index for room in run.home.rooms if room.is_called(name)}
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return 1 while it is on."""
+        """Return 1 while the light is on."""
         return constant(float(not gauge.memory <= block.home.unlit), block.first, block.end)
 
 
@@ -597,11 +589,11 @@ class sensor(Condition):
     of = ("sensor", "sensors")
 
     def start(self, run: MeasuredRun, gauge: Gauge) -> Any:
-        """Begin with whether it is on at present."""
+        """Begin with 1 if the sensor is on at present."""
         gauge.now = float(run.sensors_on[self.name])
 
     def measure(self, block: SignalBlock, gauge: Gauge) -> Trace:
-        """Return 1 while it is on."""
+        """Return 1 while the sensor is on."""
         changes = ((step, float(on)) for step, name, on in block.readings if name == self.name)
         return gauge.switched(block, changes)
 
@@ -611,7 +603,7 @@ class events(Condition):
 
     Attributes:
         kind: Kind of the event, as in the table of events.
-        entity: Name of the entity to which it happens; None: any.
+        entity: Name of the entity to which the event happens; None: any.
         detail: Detail of the event; None: any.
     """
 
@@ -637,7 +629,7 @@ class events(Condition):
         return pulses(np.array(steps, np.int64), block.first, block.end)
 
     def occasions(self, run: RunSignals) -> I64:
-        """Return the steps at which it happens, repeated for several events at one step."""
+        """Return the steps of the events, repeated for several events at one step."""
         trace = self.trace(run)
         end = np.append(trace.start[1:], trace.end)
         lengths = np.where(trace.value > 0, end - trace.start, 0)
@@ -650,7 +642,7 @@ class during(Condition):
     """Whether the time is within some hours, such as "22:00-07:00", on some days.
 
     Attributes:
-        hours: From when to when; past midnight if the second is the earlier one.
+        hours: Begin and end, across midnight if the end is earlier than the begin.
         days: Names of days, "weekdays" or "weekends", separated by commas; None: every day.
     """
 
@@ -674,7 +666,7 @@ class during(Condition):
             self._set(_span=HoursSpan(days, first, first + length, self.hours))
 
     def measures(self) -> Iterator[Measurement]:
-        """Yield nothing: it follows from the clock."""
+        """Yield nothing, as the clock is known."""
         yield from ()
 
     def trace(self, run: RunSignals) -> Trace:
