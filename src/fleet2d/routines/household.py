@@ -178,7 +178,8 @@ class Household(Settings):
         together: Their joint activities, by name.
         away: Periods in which nobody is at home.
         trips: Periods in which some members are away, by name.
-        visits: Members who are at home in these periods only, or who come by chance, by name.
+        visits: Members who are at home in these periods only, as far as their persona is, or who
+            come by chance, by name.
         welcome: Probability that members at leisure come to the door when one comes home.
         year: What changes the days of all members in the course of a year, by name, as a vacation;
             templates (`days`) are those of the members who have them.

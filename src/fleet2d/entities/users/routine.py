@@ -303,7 +303,7 @@ class Routine(ResidentBehavior):
         household: The household it belongs to: a mapping or a YAML file, the same for all of its
             members.
         away: When it is out of the home, on holiday.
-        visits: When it is in the home, if it is only a visitor.
+        visits: When it is in the home, if it is only a visitor, as far as its persona is.
     """
 
     persona: AnyPersona | None = None
