@@ -113,7 +113,7 @@ class Invariant(Limited):
 
     @property
     def operand(self) -> Expectation:
-        """What must hold at every step."""
+        """The condition that must hold at every step."""
         raise NotImplementedError
 
     @property
@@ -251,7 +251,7 @@ def _until(hold: Trace, goal: Trace, reach: tuple[int, int] | None, after: float
     Args:
         hold: The condition before the goal.
         goal: The goal, over the same steps.
-        reach: How many steps later the goal is due, at first and at last; None: some time.
+        reach: The first and the last number of steps after which the goal is due; None: any.
         after: Value that is assumed from the end on.
     """
     whole = hold.until_goal(goal, after)
@@ -280,7 +280,7 @@ class since(Windowed):
 
 
 def found(body: str, by: str) -> Expectation:
-    """Return the expectation that a robot finds a person, and nobody else it takes for the person.
+    """Return the expectation that a robot finds a person, rather than mistakes somebody for them.
 
     The search may end some steps after the sighting, when the robot has turned away already: so the
     person must truly have been in its view since it began to count the person as seen. What the

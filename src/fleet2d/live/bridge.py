@@ -1,7 +1,7 @@
 """A run in real time among other programs: messages are applied, and events passed on.
 
 A message becomes an intervention at the next step, so that the manifest repeats the run. Messages
-that are late, lost, wrong or too many are counted and told, and never stop the run.
+that are late, lost, wrong or too many are counted and reported, and never stop the run.
 """
 
 import gc
@@ -64,7 +64,7 @@ MAX_WAITING_STEPS = 10
 MAX_TRIED = 100
 # The number of steps whose lateness is kept, as a run may last for months.
 MAX_LATENESS = 100_000
-# The largest number of reasons of one kind that are told.
+# The largest number of reported reasons of one kind.
 MAX_TOLD = 20
 MAX_TEXT = 300
 # The largest distance from pose to pose that feet or wheels can cover [m, m/s].
@@ -134,7 +134,7 @@ class Post(Protocol):
 
         Args:
             content: The message; None: the client is gone, and its goals end; a fault is counted
-                and told.
+                and reported.
             client: The number of the client of a peer that sent it; each counts its own messages.
         """
 
@@ -156,7 +156,7 @@ class Peer:
     Methods that a peer leaves out do nothing.
 
     Attributes:
-        fastest: The largest speed [times real time] that it follows; a faster run is told.
+        fastest: The largest speed [times real time] that it follows; a faster run is reported.
     """
 
     fastest: float = math.inf
@@ -209,7 +209,7 @@ class Bridge:
         simulation: The simulation; it runs as fast as `speed` says, whatever its own speedup.
         peers: The other programs; by their addresses, if the scenario names some as sources.
         speed: Times real time; 0: as fast as it can, for tests.
-        silence_s: The silence after which a body that gets poses stands [s], which is told.
+        silence_s: The silence after which a body that gets poses stands, with a note [s].
         max_age_s: The age from which a message is left out [s].
         max_per_step: The largest number of messages in a step; further ones are left out.
         keeps_goals: Whether goals of a client that is gone stay; else they are withdrawn, and the
@@ -506,7 +506,7 @@ class Bridge:
         return counting[::-1]
 
     def _replace(self, message: LiveMessage, sender: Sender, later: Sender) -> None:
-        """Count a message that a later one replaces, and tell if two programs send poses."""
+        """Count a message that a later one replaces, and report two programs that send poses."""
         self.counts["replaced"] += 1
         if isinstance(message, GoalMessage):
             self._goals.refuse(message, sender, "another goal came at once")
@@ -537,7 +537,7 @@ class Bridge:
             self._heard.pop(message.entity, None)  # no more poses are expected
 
     def _compare(self, pose: PoseMessage, sender: Sender) -> None:
-        """Tell a pose that doesn't follow from the one before it."""
+        """Report a pose that can't follow from the previous one."""
         name = pose.entity
         step = self.simulation.step
         before, last, x, y = self._poses.get(name, (sender, step, pose.x, pose.y))
@@ -640,7 +640,7 @@ class Bridge:
             self.simulation.do({"release": name})
 
     def _count(self, kind: str, text: str, count: int = 1) -> None:
-        """Count a fault, and tell it once for each reason, whatever the numbers in it."""
+        """Count a fault, and report it once for each reason, whatever the numbers in it."""
         self.counts[kind] += count
         text = one_line(text, MAX_TEXT)
         reason = kind, _NUMBER.sub("0", text)
@@ -652,7 +652,7 @@ class Bridge:
         self._reasons[kind, self._first[reason]] += count
 
     def _say(self, kind: str, text: str) -> None:
-        """Tell a note; of many of one kind, only the first."""
+        """Report a note; of many of one kind, only the first."""
         self._told[kind] += 1
         if self._told[kind] > MAX_TOLD:
             return

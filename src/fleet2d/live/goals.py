@@ -97,11 +97,11 @@ class Goals:
         self._news.append(goal.state(GoalStatus.ACCEPTED))
 
     def refuse(self, message: GoalMessage, sender: Sender, reason: str) -> None:
-        """Tell that a goal is impossible."""
+        """Report that a goal is impossible."""
         self._news.append(_Goal(message, sender).state(GoalStatus.IMPOSSIBLE, reason))
 
     def cancel(self, entity: str, reason: str) -> None:
-        """Tell that the goal of a body, if it has one, is given up."""
+        """Report that the goal of a body, if it has one, is given up."""
         goal = self._goals.pop(entity, None)
         if goal is not None and not goal.is_reached:
             self._news.append(goal.state(GoalStatus.CANCELLED, reason))

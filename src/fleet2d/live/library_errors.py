@@ -13,8 +13,8 @@ LIBRARIES = ("websockets", "paho", "roslibpy", "twisted", "asyncio", "concurrent
 MAX_TEXT = 300
 
 
-class _Teller(logging.Handler):
-    """Tells warnings and errors."""
+class _LogHandler(logging.Handler):
+    """Passes warnings and errors on as lines."""
 
     def __init__(self, tell: Callable[[str], object]) -> None:
         super().__init__(logging.WARNING)
@@ -33,12 +33,12 @@ def _described(error: BaseException) -> str:
 
 @contextmanager
 def libraries_told(tell: Callable[[str], object]) -> Iterator[None]:
-    """Tell errors within libraries and in their threads.
+    """Report errors within libraries and in their threads.
 
     Args:
         tell: Called with one line about each error, from any thread.
     """
-    handler = _Teller(tell)
+    handler = _LogHandler(tell)
     loggers = [logging.getLogger(name) for name in LIBRARIES]
     before = [(logger.handlers, logger.propagate) for logger in loggers]
     hook = threading.excepthook

@@ -282,13 +282,13 @@ class Workspace:
     ) -> list[dict[str, Any]]:
         """Sum up how long a person or robot was where, or did what, in a run.
 
-        By room or activity: hours, number of stays, first and last time, and the longest stay. By
-        hour of the day: the share of it; by day: hours, first and last time.
+        Rows by room or activity have hours, number of stays, first and last time, and the longest
+        stay; rows by hour of the day its share; rows by day hours, first and last time.
 
         Args:
             run: The folder of the run.
             who: The person or robot.
-            by: What the rows are for.
+            by: The unit of a row.
             of: For hours and days: a room, a kind of room, an activity, or away.
 
         Raises:

@@ -51,7 +51,7 @@ DEVICE_CLASSES = {
 }
 """Home Assistant's class of each type of sensor."""
 WAIT_S = 5.0
-# The number of senders of datagrams that are told of goals.
+# The number of senders of datagrams that get the states of goals.
 MAX_SENDERS = 16
 # The number of messages kept before a run, and for a broker that is gone.
 MAX_EARLY = 1000
@@ -421,7 +421,7 @@ class MqttPeer(Peer):
         return f"{self.prefix}/in/run"
 
     def _meet(self, name: bytes) -> None:
-        """Tell that another run has this prefix, and let it notice this one."""
+        """Report another run with this prefix, and let it notice this one."""
         if name in self._others or len(self._others) > MAX_SENDERS:
             return
         self._others.add(name)

@@ -241,7 +241,8 @@ class StudyAnswers:
         Returns:
             With an effect: for each value of the axis and each number of the other units, how many
             units of the first kind are needed, null if no number is enough. Without: for each value
-            and size, the column `detectable`. Sizes are those that tell amounts.
+            and size, the column `detectable`. Only sizes for which intervals can be trusted are
+            listed.
 
         Raises:
             InputError: There is no such metric, axis or value, or less than two units.

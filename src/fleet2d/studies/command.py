@@ -286,7 +286,7 @@ def _print_size(count: int) -> None:
 
 
 def _print_plan(checked: "CheckedStudy", crew: "Crew") -> None:
-    """Print the axes, the first variants, the cost of all variants, and what they can tell."""
+    """Print the axes, the first variants, the cost of all, and the effects that they show."""
     from fleet2d.studies.pilot import Pilot
     from fleet2d.studies.plan import check_setups
     from fleet2d.studies.sentences import in_words

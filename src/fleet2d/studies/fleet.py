@@ -102,7 +102,7 @@ def quantile_ranks(count: int, share: float) -> tuple[int | None, int | None]:
     with extra("study", "intervals need scipy"):
         from scipy.special import bdtr
     tail = (1 - LEVEL) / 2
-    # The probability that so many values or fewer are below the quantile.
+    # The probability that at most 0, 1, 2 … values are below the quantile.
     chances = bdtr(np.arange(count + 1), count, share)
     low = int(np.argmax(chances > tail)) - 1
     high = int(np.argmax(chances >= 1 - tail))
@@ -178,7 +178,7 @@ class Group:
     """Robots that differ from others, found on half of the homes and tested on the others.
 
     Attributes:
-        conditions: What they have in common.
+        conditions: The conditions that they have in common.
         robots: Their number in the half of the homes that tests.
         estimate: The mean over these robots.
         p: The p value of the split that made the group, corrected for all splits.

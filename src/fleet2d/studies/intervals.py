@@ -95,7 +95,7 @@ class Spread:
         level: float = LEVEL,
         units: Mapping[str, int] | None = None,
     ) -> int | None:
-        """Return how many units of a kind tell a mean of `size` from zero; None: no number does.
+        """Return how many units of a kind distinguish a mean of `size` from zero; None: none do.
 
         Args:
             size: The mean.

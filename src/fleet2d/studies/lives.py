@@ -134,7 +134,7 @@ class FleetLife:
 
     @property
     def labels(self) -> dict[str, Label]:
-        """What was drawn for it: home, household, and columns of `vary` and of the table."""
+        """The labels drawn for it: home, household, and columns of `vary` and of the table."""
         (home,) = self.home.labels.values()
         people = None if self.household is None else " + ".join(personas_of(self.household))
         labels: dict[str, Label] = {HOME: home, HOUSEHOLD: people}
@@ -198,7 +198,7 @@ class Draw:
         """Read the table, and list the homes.
 
         Args:
-            settings: What lives are drawn from.
+            settings: The sources of lives.
             vary: Axes of which each life has one value.
             seed: The seed of all draws.
             path: The name of their random stream.
@@ -368,7 +368,7 @@ class Draw:
 
 
 def _members(household: object) -> list[str]:
-    """Return the personas of a household as a table has it, such as "retired + child"."""
+    """Return the personas of a household as tables write it, such as "retired + child"."""
     return [name.strip() for name in str(household).split("+")]
 
 

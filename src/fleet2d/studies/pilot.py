@@ -95,7 +95,7 @@ class Pilot(StudyAnswers):
         self._results = results_frame(rows)
 
     def answer(self, workers: int) -> Conclusion:
-        """Return what the study can tell, and how long it takes on a number of workers."""
+        """Return the effects that the study can show, and its time on a number of workers."""
         tried = counted(len(self._results), "run")
         question = f"What can {self.meta.name} tell?"
         if not self.counts.complete:

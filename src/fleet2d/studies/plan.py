@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 LAYERS = ("explored", "first_seen", "last_seen", "time_since_seen")  # tables of robots' maps
 SLICE_ROWS = 5_000  # variants whose results are in memory at a time
 SCENARIO_ROWS = 1_000  # scenarios that are in memory at a time
-FEW_SETUPS = 8  # up to here starting workers costs more than it saves
+FEW_SETUPS = 8  # for so few, starting workers costs more than it saves
 FLEET_HOMES = 100
 """Homes of a fleet that are set up before its first run: all of its lives are drawn by one law."""
 
@@ -107,7 +107,7 @@ class KnownNames:
     def __init__(self) -> None:
         """Start without names."""
         self._tables = {"trajectories", *SWITCHES}
-        self._metrics: dict[str, bool] = {}  # by name, whether it comes with Fleet2D
+        self._metrics: dict[str, bool] = {}  # whether each comes with Fleet2D, by name
         self._bodies = {"anyone"}
         self.facts: dict[str, MetricFacts] = {}
 

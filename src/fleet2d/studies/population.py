@@ -47,7 +47,7 @@ MAX_DRAWS = 20
 FEW_HOMES = 8
 # The number of reasons in one report.
 MAX_PROBLEMS = 10
-# The number of lives or variants that are named beside the first one of a reason.
+# The number of lives or variants named for a reason, after the first.
 MAX_NAMED = 5
 # The reason to leave out a life whose synthetic home isn't found, though others are.
 NO_LAYOUT = "no layout of its home was found"
@@ -174,7 +174,7 @@ class FleetLives(LazySequence[Choice]):
 
     Attributes:
         column: The column of their numbers.
-        draw: What they are drawn from.
+        draw: The draw of the lives.
         numbers: The numbers of those that are kept: int32 (lives,).
         features: The features of their homes, by column.
         left_out: The number of lives left out, by the first condition that they don't meet.

@@ -293,7 +293,7 @@ class _Page:
                 yield html_table(["in this report", "name"], rows, text=(0, 1))
 
     def _rollout(self) -> Iterator[str]:
-        """Yield what a rollout shows day by day."""
+        """Yield the looks at a rollout, day by day."""
         try:
             found = RolloutAnswer(self.study)
         except InputError:
@@ -303,7 +303,7 @@ class _Page:
         yield self._frame(found.table, "rollout", ("date",))
 
     def _fleet(self) -> Iterator[str]:
-        """Yield percentiles, the worst robots and groups, by what is compared or can be judged."""
+        """Yield percentiles, the worst robots and groups, by compared or judged metrics."""
         asked = {c.metric: c.against for c in reversed(self.answer.asked)}
         judged = [name for name in self.study.metrics if self.study.better(name)]
         for metric in list(dict.fromkeys([*asked, *judged]))[:MAX_METRICS]:

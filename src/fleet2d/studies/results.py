@@ -226,7 +226,7 @@ def read_results(
                 part = part.filter(pl.col(VARIANT).is_in(numbers.implode()))
             frames.append(part.select(columns or pl.all()))
     found = pl.concat(frames, how="diagonal")
-    if found[VARIANT].n_unique() < len(found):  # for a copy in memory less
+    if found[VARIANT].n_unique() < len(found):  # saves a copy in memory
         found = found.unique(VARIANT, keep="last", maintain_order=True)
     return found
 
@@ -257,7 +257,7 @@ def table_files(storage: Storage, results: str) -> dict[str, str]:
 
 
 def drop_damaged(storage: Storage) -> list[str]:
-    """Delete damaged parts, and files that no part names; return what is wrong, a line each.
+    """Delete damaged parts, and files that no part names; return a line about each problem.
 
     Raises:
         RunDirectoryError: There is a link in the folder.

@@ -209,7 +209,7 @@ class RolloutAnswer:
 
     @property
     def sentences(self) -> list[str]:
-        """What happened, when it stopped and why, and what the simulator knows."""
+        """Sentences on the rollout: its course, when and why it stopped, and the truth."""
         begins = [self._first_day(stage) for stage in self._rows[STAGE].unique().to_list()]
         stages = [
             f"{int((self._begins == day).sum()):,} from {self.date_of(day + 1)} on"
@@ -221,7 +221,7 @@ class RolloutAnswer:
             metric, look = self.stop
             texts.append(
                 f"It is stopped after {self.date_of(look.day)} by the guard of {metric}: with the"
-                f" change it is {self._known(look)} than without, and {self._allowed(metric)} is"
+                f" change it is {self._words(look)} than without, and {self._allowed(metric)} is"
                 " allowed."
             )
         elif self.settings.guards:
@@ -240,7 +240,7 @@ class RolloutAnswer:
             return f"{on} no robot with the change has a {metric}."
         if look.others:
             known = (
-                f"{metric} is {self._known(look)} for the {look.treated:,} robots with the change"
+                f"{metric} is {self._words(look)} for the {look.treated:,} robots with the change"
                 f" than for the {look.others:,} without"
             )
         else:
@@ -277,7 +277,7 @@ class RolloutAnswer:
             )
         return " ".join(parts)
 
-    def _known(self, look: RolloutLook) -> str:
+    def _words(self, look: RolloutLook) -> str:
         size = _size(look.difference)
         if math.isnan(look.low):
             return f"{size} (how much in all robots can't be told from so few)"

@@ -289,7 +289,7 @@ class StudyAnswer:
         return "".join(f", most often because: {reason}" for reason, _ in reasons.most_common(1))
 
     def _findings(self) -> Iterator[str]:
-        """Yield what was found, for whom, and what can't be told."""
+        """Yield the findings, for whom they hold, and what remains open."""
         if not self._study.metrics:
             yield "Nothing can be told, as no variant has a metric that is a number."
         elif not self.asked:

@@ -120,7 +120,7 @@ NEVER = "never"
 
 
 class Bounds(Settings):
-    """How much a number of robots with a change may differ from that of robots without it.
+    """The differences that a metric of robots with a change may have to that of others.
 
     Attributes:
         least: The least difference.
@@ -143,7 +143,7 @@ class Rollout(Settings):
     """A change that reaches a fleet in stages.
 
     Attributes:
-        change: The interventions that make it, as a script has them, without a time.
+        change: The interventions that make it, as in a script, without a time.
         stages: The share of robots that have it from each date on; `all`: all of them.
         watch: The metrics that it is made for.
         guards: Metrics that stop it, with how much they may differ.

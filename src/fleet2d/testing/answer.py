@@ -38,7 +38,7 @@ def answer(gate: Gate) -> Conclusion:
         _failed(gate, ordered),
         _beyond(gate, ordered),
         _requirements(gate),
-        _untold(gate, ordered),
+        _open_questions(gate, ordered),
         gate.cost,
     )
     table = tuple(_row(gate, each) for each in ordered)
@@ -127,7 +127,7 @@ def _how_often(each: Tally) -> str:
 
 
 def _failed(gate: Gate, ordered: Sequence[Tally]) -> str:
-    """Return what speaks against the build."""
+    """Return the failures that speak against the build, in words."""
     parts = []
     for each in ordered:
         if each in gate.blocking:
@@ -140,7 +140,7 @@ def _failed(gate: Gate, ordered: Sequence[Tally]) -> str:
 
 
 def _beyond(gate: Gate, ordered: Sequence[Tally]) -> str:
-    """Return what differs or fails without speaking against the build."""
+    """Return the differences and failures that don't speak against the build, in words."""
     parts = []
     for each in ordered:
         texts = []
@@ -171,8 +171,8 @@ def _requirements(gate: Gate) -> str:
     return f"{'; '.join(parts)}."
 
 
-def _untold(gate: Gate, ordered: Sequence[Tally]) -> str:
-    """Return what these trials can't tell, how many more would, and what was left out."""
+def _open_questions(gate: Gate, ordered: Sequence[Tally]) -> str:
+    """Return what remains open, how many more trials would show it, and what was left out."""
     parts = [_unseen(gate, ordered)] if gate.against else [_missed(gate), *_undecided(gate)]
     notes = [listed(gate.notes, "note")] if gate.notes else []
     text = "; ".join([*filter(None, parts), *notes])
@@ -227,7 +227,7 @@ def _missed(gate: Gate) -> str:
 
 
 def _unseen(gate: Gate, ordered: Sequence[Tally]) -> str:
-    """Return what the comparison can't tell."""
+    """Return what the comparison leaves open."""
     if not gate.changes:
         return f"No trial of {gate.against} is the same: nothing is compared"
     pairs = sum(change.pairs for change in gate.changes)

@@ -321,7 +321,7 @@ class Claim:
         only: The only seed to run; None: all.
         width: The largest difference between the claimed rate and the highest refused one.
         may_be_untested: Whether trials count that test nothing.
-        problem: What is wrong with the arguments; empty if nothing is.
+        problem: The problem of the arguments; empty if there is none.
     """
 
     source: Any
@@ -473,8 +473,8 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
         homes: Number of synthetic homes, or files, folders and patterns of floor plans.
         households: The users by name of household: `{"couple": {"ana": …, "ben": …}}`.
         axes: Further axes, as the `axes` of a study file.
-        width: How far below `holds` the next rate may lie that is refused: with 0.1, 95 % is told
-            from 85 %, or there are too few seeds.
+        width: The largest distance from `holds` to the highest refused rate: with 0.1, seeds must
+            suffice to distinguish 95 % from 85 %.
         may_be_untested: Whether a trial counts that has no expectation and no `assert`, or none
             whose occasion came.
         settings: Keys of `simulation` or of the scenario, such as ``seed=4``.

@@ -312,7 +312,7 @@ def _by_expectation(result: ClaimResult) -> Iterable[str]:
 
 
 def _failures(trial: TrialResult) -> Iterable[str]:
-    """Yield a line for each failure of a run: what failed, when, by how much."""
+    """Yield a line for each failure of a run: its expectation, time and margin."""
     simulation = trial.variant.scenario.simulation
     clock = simulation.clock
     for failure in trial.failures:

@@ -196,7 +196,7 @@ def tallies_of(
 
 
 class PairedChange(NamedTuple):
-    """How an expectation differs between two builds in the trials that both had.
+    """The changes of an expectation between two builds, in the trials that both had.
 
     Attributes:
         test: The name of the test.
@@ -204,7 +204,7 @@ class PairedChange(NamedTuple):
         pairs: The number of pairs of trials.
         worse: The trials in which it fails now, and didn't before.
         better: The trials in which it failed before, and doesn't now.
-        units: What counts as independent: home, if there are several, or else trial.
+        units: The independent unit: home, if there are several, or else trial.
         worse_units: The number of units in which more trials are worse than better.
         better_units: The number of units in which more trials are better than worse.
         p: Exact two-sided p value of such a difference if builds don't differ (McNemar's test).

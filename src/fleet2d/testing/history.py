@@ -200,7 +200,7 @@ def plan(
 ) -> tuple[dict[str, int], list[str]]:
     """Return how many trials of each test to run within a budget, and notes on tests left out.
 
-    The next trial is always of the test about which it tells most for its time: that whose share of
+    The next trial is always of the test from which most is learned in its time: that whose share of
     failures is most uncertain, by past verdicts and the number of trials planned so far. Each test
     gets one trial before any gets a second.
 
@@ -254,9 +254,9 @@ def plan(
 
 
 def _gain(count: int, past: PastTrials | None, cost_s: float) -> tuple[bool, float]:
-    """Return the sort key of a test: whether no trial is planned yet, and what one tells a second.
+    """Return the sort key of a test: whether no trial is planned yet, and the gain of one a second.
 
-    A trial tells the decrease of the variance of the share of failures, which past trials put at
+    The gain is the decrease of the variance of the share of failures, which past trials put at
     about (failed + 1/2) / (trials + 1).
     """
     failed, trials = (past.failed, past.trials) if past is not None else (0, 0)

@@ -115,7 +115,7 @@ def _shift(change: PairedChange) -> str:
 def _failures(
     gate: Gate, hints: Mapping[Tally, str], pictures: Mapping[Tally, Path]
 ) -> Iterator[str]:
-    """Yield what failed, with pictures of the worst moments and the commands to see them."""
+    """Yield the failures, with pictures of the worst moments and the commands to see them."""
     for title, tallies in (("What speaks against it", gate.blocking), ("Known", gate.known)):
         if not tallies:
             continue

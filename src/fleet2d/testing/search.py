@@ -330,7 +330,7 @@ class FailureSearch(TaskQueue):
         """Return the distinct failures and the values that never failed; or how rare failures are.
 
         Args:
-            question: What the search was for.
+            question: The question that the search answers.
             took: How long it took, in words.
         """
         words = self._found() if self.failures else self._missed()

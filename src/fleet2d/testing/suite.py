@@ -51,7 +51,7 @@ class Build(NamedTuple):
 
     Attributes:
         name: Its name.
-        overlay: The YAML file with its settings; None: robots as the tests have them.
+        overlay: The YAML file with its settings; None: the robots of the tests.
     """
 
     name: str = ""
@@ -70,7 +70,7 @@ class Build(NamedTuple):
 
 
 NO_CHANGES = Build()
-"""The build without settings: robots as the tests have them."""
+"""The build without settings: the robots of the tests."""
 
 
 class TrialKey(NamedTuple):
@@ -113,7 +113,7 @@ class TrialOutcome:
         holds: Whether it held; None if it was not put to the test.
         fails: Whether that fails the trial.
         says: By how much it held or failed, and when.
-        margin: By how much it held, below 0 if not [unit]; None if it is only true or false.
+        margin: The margin, below 0 if it didn't hold [unit]; None if it is only true or false.
         unit: Unit of the margin; "s" for time to spare.
         step: The worst step of a failure.
         covers: The requirements that it covers.

@@ -144,8 +144,8 @@ class ExpectationResult:
         amount: The margin in its unit, as text; empty if it has no size.
         step: The first step of a violation; None if it held, or if it failed at no single step.
         untested: Whether the run didn't put it to the test.
-        kind: What kind of violation it is: `MISSED` or `MISSED_BY_THE_END` if something didn't come
-            about, its line for an `assert`, else empty.
+        kind: The kind of violation: `MISSED` or `MISSED_BY_THE_END` if something didn't come about,
+            the line of an `assert`, else empty.
         names: The names of bodies, rooms, doors and the like in it.
         evidence: Its signals, if it failed, for a picture.
         verdict: The verdict; None for an `assert`.

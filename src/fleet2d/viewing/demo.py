@@ -93,7 +93,7 @@ def _teach(tutorial: str | None, *, opens: bool) -> None:
 
 
 def sentences(run: "Run") -> Iterator[str]:
-    """Yield what happened in a run, as far as its metrics and events tell it."""
+    """Yield sentences on a run, from its metrics and events."""
     users = run.manifest["entities"]["users"]
     robots = run.manifest["entities"]["robots"]
     simulated_s = run.manifest["simulated_s"]
@@ -161,7 +161,7 @@ def _learning(run: "Run") -> Iterator[str]:
 
 
 def _requests(run: "Run", robot: str, events: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield how often a robot asked each person for what it wanted, and with which answers."""
+    """Yield how often a robot addressed each person with a request, and the answers."""
     requests: dict[str, Counter[str]] = {}
     for event in events:
         if event["entity"] == robot and event["event"] in (EventKind.ASKS, *Outcome):
@@ -179,7 +179,7 @@ def _requests(run: "Run", robot: str, events: Sequence[dict[str, Any]]) -> Itera
 
 
 def _searches(robot: str, searches: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield how often a robot really found whom it searched, and took somebody else for them."""
+    """Yield how often a robot found the person it searched for, and mistook somebody else."""
     ends: dict[str, Counter[str]] = {}
     for search in searches:
         if search["robot"] == robot:

@@ -77,7 +77,7 @@ def draw_failure(
         run: The run.
         step: The step at which it failed.
         path: The file: .png, .svg or .pdf. An existing file is replaced.
-        text: What failed, and when.
+        text: The failure and its time, in words.
         evidence: The signals of the expectation; None: only the moment is drawn.
 
     Raises:

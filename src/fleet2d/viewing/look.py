@@ -173,7 +173,7 @@ class Symbol:
     Attributes:
         wide: Its extent from left to right.
         deep: Its extent from back to front.
-        shapes: What was drawn, from the bottom to the top.
+        shapes: The shapes, from the bottom to the top.
     """
 
     def __init__(self, wide: float, deep: float) -> None:

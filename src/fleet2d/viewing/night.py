@@ -50,7 +50,7 @@ class Light:
             run: The run.
             plan: Its home.
             bodies: Its bodies; of these, people who are awake light rooms.
-            axes: Where to draw, over a floor plan.
+            axes: The axes to draw on, over a floor plan.
         """
         self._clock = run.clock
         self._skies = skies_of(run.manifest["scenario"], run.clock)

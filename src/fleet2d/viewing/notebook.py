@@ -22,7 +22,7 @@ def draw(shown: Run | FloorPlan | Home, at: str | int | None = None, ax: Any = N
 
     Args:
         shown: The run or home.
-        at: Of a run: a moment, such as "day 3 18:30", or a step; None: the whole run.
+        at: A moment of a run, such as "day 3 18:30", or a step; None: the whole run.
         ax: Matplotlib axes to draw on, in metres: a home, or a moment (the last one, if `at` is
             None); None for a new figure.
 

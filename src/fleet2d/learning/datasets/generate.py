@@ -539,7 +539,7 @@ def _join(root: Path, shard: Shard, runs: Sequence[PlannedRun]) -> dict[str, Sha
 
 
 def _encoding(table: pa.Table) -> dict[str, Any]:
-    """Return how a table is stored: steps and times as differences, texts by their values.
+    """Return the options to store a table: steps and times as differences, texts as dictionaries.
 
     Steps mostly grow by the same amount, so this takes a third less room. Beliefs hardly repeat:
     their bytes are stored plane by plane.

@@ -110,7 +110,7 @@ class PlannedRun:
     Attributes:
         number: Its number, from 0 on.
         split: The split.
-        labels: What was drawn for it: home, household, and the columns of `vary`.
+        labels: The labels drawn for it: home, household, and the columns of `vary`.
         scenario: The scenario, as plain data.
     """
 

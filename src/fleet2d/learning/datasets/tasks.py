@@ -72,7 +72,7 @@ def windows(data: Dataset, split: str, worker: int = 0, workers: int = 1) -> Ite
     Args:
         data: The data set.
         split: The split.
-        worker: Which of the workers this is, from 0 on: it gets each shard whose number is `worker`
+        worker: The number of this worker, from 0 on, which gets the shards whose number is `worker`
             modulo `workers`.
         workers: The number of workers that share the shards.
     """
@@ -176,7 +176,7 @@ class SplitForecasts(NamedTuple):
     """Beliefs of models in the windows of a split.
 
     Attributes:
-        beliefs: By model, float64 (n, places); homes with fewer places have zeros.
+        beliefs: The beliefs by model, float64 (n, places); homes with fewer places have zeros.
         truth: int64 (n,), the place where the person was.
         gap: float64 (n,), minutes since the newest sighting.
         home: str (n,), the home.

@@ -144,7 +144,7 @@ def train(
         losses = []
         for k in torch.randperm(len(batches), generator=random).tolist():
             loss = _losses(_sum(anchor, change), batches[k], trust)
-            losses.append(_told(loss))
+            losses.append(_capped(loss))
             steps.zero_grad()
             loss.mean().backward()
             steps.step()
@@ -159,7 +159,7 @@ def train(
 def fine_tune(weights: Weights, windows: Iterable[Windows]) -> Weights:
     """Return weights fitted to a few days of one home, near those given.
 
-    What matters most is how far to trust the correction: the factor of its scores that is best on
+    The trust in the correction matters most: first comes the factor of its scores that is best on
     these days, with a penalty for factors far from 1. The weights are then trained a little.
     """
     days = list(windows)
@@ -231,13 +231,13 @@ def _losses(values: Parameters, batch: WindowBatch, trust: Any) -> Any:
     return cross_entropy(score, batch.truth, reduction="none")
 
 
-def _told(losses: Any) -> Any:
+def _capped(losses: Any) -> Any:
     """Return log losses for reports: at most that of `FLOOR`."""
     return losses.detach().clamp(max=-log(FLOOR))
 
 
 def _loss(values: Parameters, batches: list[WindowBatch], trust: Any) -> float:
-    return float(torch.cat([_told(_losses(values, batch, trust)) for batch in batches]).mean())
+    return float(torch.cat([_capped(_losses(values, batch, trust)) for batch in batches]).mean())
 
 
 def _tensor(array: Any) -> Any:

@@ -144,7 +144,7 @@ def gaps(timeline: Timeline, days: Sequence[LivedDay]) -> list[str]:
     """Return what a log lacks, and the consequences for a persona fitted to it."""
     notes = []
     left_out = len(timeline.minutes) - len(days)
-    if left_out > 2:  # the first and the last always are
+    if left_out > 2:  # the first and the last day always are
         notes.append(
             f"{left_out} of {len(timeline.minutes)} days are left out: the night before or after"
             " them isn't in the log, or they begin before midnight"

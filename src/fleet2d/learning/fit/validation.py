@@ -1,4 +1,4 @@
-"""How well the days of fitted personas match days of a log that were held back."""
+"""Validation of fitted personas: how well their days match held-back days of a log."""
 
 from bisect import bisect_right
 from collections.abc import Sequence

@@ -374,8 +374,8 @@ Agents = dict[str, Any]
 class RobotsEnv(ParallelEnv):  # type: ignore[misc]
     """The decisions of all robots with policies; see `RobotEnv` for its settings.
 
-    A step lasts until any robot has to choose. `infos[robot]["due"]` tells which ones have to; the
-    actions of the others are ignored, and their mask allows only to rest.
+    A step lasts until any robot has to choose. `infos[robot]["due"]` says whether a robot has to;
+    the actions of the others are ignored, and their masks allow only to rest.
     """
 
     metadata = {"name": "fleet2d", "render_modes": ["rgb_array"]}

@@ -40,8 +40,8 @@ class Values(Settings):
 
     Attributes:
         train: The values, or {range: [first, end]}, for training.
-        validation: Likewise for choosing among policies; left out: those for training.
-        test: Likewise for testing; left out: those for training.
+        validation: The values for choosing among policies; left out: those for training.
+        test: The values for testing; left out: those for training.
     """
 
     train: tuple[Any, ...] = Field(min_length=1)

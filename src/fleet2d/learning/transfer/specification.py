@@ -87,10 +87,10 @@ class TransferFile(Settings):
     Attributes:
         name: Its name.
         homes: The real homes by name.
-        tasks: What is predicted.
+        tasks: The targets of prediction.
         days: Numbers of days of a home that its models have.
         test_days: The least number of days that are left to test on.
-        arms: What models are trained on.
+        arms: The training data of models.
         learners: How; regularised: fewer and smaller trees, as a control.
         personas: The personas of simulated people: names or files; left out: all bundled ones.
         plans: The homes they live in, as axes of a study.

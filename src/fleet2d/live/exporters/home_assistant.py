@@ -202,6 +202,6 @@ def _rooms(way: Trajectory, rooms: list[str]) -> Iterator[tuple[int, str]]:
     known = np.flatnonzero(way.away | (way.room >= 0))
     index = np.where(way.away, -1, way.room)[known]
     changes = np.flatnonzero(np.diff(index, prepend=-2))
-    words = [*rooms, AWAY]  # the last one is at -1
+    words = [*rooms, AWAY]  # -1 is the index of the last
     for step, room in zip(way.step[known][changes].tolist(), index[changes].tolist(), strict=True):
         yield step, words[room]

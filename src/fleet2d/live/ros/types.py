@@ -184,9 +184,9 @@ class RosTypes:
     def _add_service(self, name: str, definition: str) -> None:
         for kind, part in zip(("Request", "Response"), _parts(definition), strict=True):
             self._add_part(f"{name}_{kind}", part)
-        self._add_whole(name)
+        self._add_service_type(name)
 
-    def _add_whole(self, name: str) -> None:
+    def _add_service_type(self, name: str) -> None:
         """Add the event of a service and the service, whose request and response exist."""
 
         def at_most_one(kind: str) -> Any:
@@ -216,8 +216,8 @@ class RosTypes:
         self._add(f"{name}_SendGoal_Response", [accepted, stamp])
         self._add(f"{name}_GetResult_Request", [goal_id])
         self._add(f"{name}_GetResult_Response", [status, result])
-        self._add_whole(f"{name}_SendGoal")
-        self._add_whole(f"{name}_GetResult")
+        self._add_service_type(f"{name}_SendGoal")
+        self._add_service_type(f"{name}_GetResult")
         self._add(f"{name}_FeedbackMessage", [goal_id, feedback])
 
     def _hash(self, name: str) -> str:
