@@ -505,7 +505,7 @@ class Body:
         return at
 
     def step_off(self, x: int, y: int) -> LatticePoint | None:
-        """Return the free point beside an object that the body is on; None: it is on none."""
+        """Return the point where the body steps off the object at a point; None: it needn't."""
         approach = self.home.approach_of((x, y))
         # Chairs round a table may leave a gap in which a body fits without a way out.
         if approach is None:

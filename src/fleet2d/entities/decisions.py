@@ -174,7 +174,7 @@ class Arbiter:
         return time if time > now.time else None
 
     def _hours_of(self, number: int, time: datetime) -> tuple[datetime, bool]:
-        """Return whether the hours of a behavior hold, after the time of the next change."""
+        """Return the time until which a behavior's hours hold or don't, and whether they do."""
         since, until, holds_now = self._hours.get(number, (time, time, False))
         if not since <= time < until:
             when = self.behaviors[number].when

@@ -35,16 +35,17 @@ NO_BREAKPOINTS = Breakpoints(_NONE, _NONE, _NONE, _NONE, np.zeros(0, np.uint8))
 
 
 class Battery(Settings):
-    """A battery, described by how long it lasts; the charge falls at one of two constant rates.
+    """A battery, described by its running times; the charge falls at one of two constant rates.
 
     Attributes:
-        driving: How long a full charge lasts driving or turning.
-        standing: How long a full charge lasts standing still.
-        charging: How long it takes to charge from empty to full.
-        charger: Where the charger is: a point, or a room, at the point farthest from its walls.
+        driving: Time that a full charge lasts driving or turning.
+        standing: Time that a full charge lasts standing still.
+        charging: Time to charge from empty to full.
+        charger: The place of the charger: a point, or a room, for the point farthest from its
+            walls.
         charge: Charge when the run begins.
-        wakes_at: Charge at which the robot, whose battery was empty, is on again: it charges when
-            somebody puts it to its charger.
+        wakes_at: Charge at which a robot with an empty battery is on again, after somebody has put
+            it to its charger.
     """
 
     driving: PositiveDuration
@@ -81,10 +82,10 @@ class Charge:
 
     Attributes:
         level: Charge at the last decision, 0 to 1.
-        charger: Where the charger is [lattice].
+        charger: Position of the charger [lattice].
         is_broken: Whether the charger doesn't charge.
-        is_off: Whether the robot is off: its charge doesn't fall.
-        wakes_at: Charge at which it is on again after its battery was empty.
+        is_off: Whether the robot is off, so that its charge doesn't fall.
+        wakes_at: Charge at which the robot is on again after its battery was empty.
     """
 
     is_broken = False
@@ -93,7 +94,7 @@ class Charge:
     def __init__(self, battery: Battery, body: Body) -> None:
         self.level = battery.charge
         self.wakes_at = battery.wakes_at
-        self._gain = 1 / micros(battery.charging)  # per us
+        self._gain = 1 / micros(battery.charging)  # charge per us
         self._rates = -1 / micros(battery.driving), -1 / micros(battery.standing), self._gain
         self.charger = stop_at(body, battery.charger)
         self._recorded = -1.0
@@ -110,9 +111,9 @@ class Charge:
         return f"{100 * self.level:.1f} %"
 
     def follow(self, motion: Motion, until_us: int) -> None:
-        """Update the charge: a motion was followed from the last decision to a moment.
+        """Update the charge after a motion from the last decision to a moment.
 
-        Before `level`, `is_broken` or `is_off` is set at that moment, this is to be called.
+        Call this before setting `level`, `is_broken` or `is_off` at that moment.
         """
         if self.is_off:
             self.level = float(self.course(motion).levels(np.array([until_us]))[0])
@@ -121,8 +122,8 @@ class Charge:
         self._since_us = until_us
 
     def course(self, motion: Motion) -> ChargeCurve:
-        """Return the charge from the last decision on, if a motion is followed."""
-        if self.is_off:  # at rest
+        """Return the course of the charge from the last decision on during a motion."""
+        if self.is_off:  # a robot that is off rests
             track = _track(motion)
             ends = np.stack([track.x, track.y], axis=1)[-1:].tolist()
             charges = list(self.charger) in ends and not self.is_broken
@@ -131,15 +132,15 @@ class Charge:
         return ChargeCurve(*kernels.charge_pieces(_track(motion), self._state))
 
     def falls_to(self, level: float, motion: Motion) -> int | None:
-        """Return when the charge falls to a level [us], if a motion is followed; None: never."""
+        """Return the time at which a motion brings the charge down to a level [us]; None: never."""
         return kernels.charge_falls_to(_track(motion), self._state, level)
 
     def time_to_charge(self, level: float) -> int:
-        """Return how long it takes to charge to a level [us]."""
+        """Return the time to charge to a level [us]."""
         return max(0, int((level - self.level) / self._gain) + 1)
 
     def wakes_after(self, motion: Motion) -> int | None:
-        """Return how long a robot at rest charges until it is on again [us]; None: it doesn't."""
+        """Return the time of charging until a robot at rest is on again [us]; None: never."""
         is_charging = self.is_off and self.course(motion).rates[0] > 0
         return self.time_to_charge(self.wakes_at) if is_charging else None
 
@@ -159,12 +160,12 @@ class Charge:
 
 
 def _track(motion: Motion) -> Breakpoints:
-    """Return the track of a motion; an empty one for a random walk, which never stops."""
+    """Return the track of a motion, empty for a random walk, which never stops."""
     return motion.breakpoints if isinstance(motion, Track) else NO_BREAKPOINTS
 
 
 MAX_CORRECTION_INTERVAL = timedelta(days=1)
-# Noise is in 1/65536 of the unit of what it is added to, per unit of random_bell.
+# Noise per unit of random_bell is in 1/65536 of the unit of its quantity.
 FINE = 1 << 16
 ALONG_AXES = [f"{kind} {axis}" for kind in ("drift", "left", "jump") for axis in "xy"]
 PURPOSES = (*ALONG_AXES, "turn", "jumps", "when")
@@ -174,17 +175,17 @@ class Localization(Settings):
     """The error of a robot's estimate of its own pose; by default there is none.
 
     The error drifts from a residual after each correction, may jump once between two corrections,
-    and is corrected at fixed intervals. The people that the robot sees are misplaced by it, too.
+    and is corrected at fixed intervals. People that the robot sees are misplaced by the error, too.
 
     Attributes:
         drift: Standard deviation per axis, a minute after a correction [m].
         drift_deg: Standard deviation of the heading, a minute after a correction [deg].
         jump: Standard deviation per axis of a jump [m].
-        jumps_per_hour: How often the error jumps.
+        jumps_per_hour: Mean number of jumps of the error.
         corrected_every: Time from correction to correction.
         left: Standard deviation per axis that remains after a correction [m].
-        relocalizes: After a kidnapping or a loss of localization it knows where it is once its
-            camera has seen the home for this long; null: when that is over.
+        relocalizes: Time for which the camera has to see the home until a kidnapped or lost robot
+            knows where it is; null: it knows when the intervention ends.
     """
 
     drift: Length = Field(default=0.0, ge=0, le=10)
@@ -209,14 +210,14 @@ class Localization(Settings):
 
 
 class Displacement(NamedTuple):
-    """A period in which a robot believes that it is where it was before it was carried off.
+    """A period in which a robot believes itself to be where it was before it was carried off.
 
     Attributes:
         first: The first step.
         end: The step after the last one.
-        x: Its believed x minus the true one [lattice].
+        x: The believed x minus the true one [lattice].
         y: Likewise.
-        turn: Its believed heading minus the true one [1/4096 turn].
+        turn: The believed heading minus the true one [1/4096 turn].
     """
 
     first: int
@@ -267,7 +268,7 @@ class Drift:
             step_us: Length of a step [us].
             seed: The seed of the run.
             path: The path of the robot in the scenario, "robots.astro".
-            displacements: When it was carried off; a list that may grow.
+            displacements: The displacements of the robot, a list that may grow.
         """
         self._displacements = displacements
         self._step_us = step_us
@@ -290,7 +291,7 @@ class Drift:
         has_jumped = elapsed_us >= jumps_at[which]
 
         def sample(purpose: str, noise: int) -> I64:
-            """Return for each step the draw of its interval."""
+            """Return the draw of each step's interval."""
             draws = [kernels.random_bell(self._keys[purpose], interval) for interval in intervals]
             return (np.array(draws, np.int64) * noise)[which]
 
@@ -309,7 +310,7 @@ class Drift:
         return Offsets(*off)
 
     def misplace(self, x: I64, y: I64, robot_x: I64, robot_y: I64, steps: I64) -> tuple[I64, I64]:
-        """Return where the robot takes points that it sees to be: x and y [lattice].
+        """Return the places at which the robot believes seen points to be: x and y [lattice].
 
         Args:
             x: The points' true x [lattice], int64 (n,).
@@ -323,7 +324,7 @@ class Drift:
         return robot_x + off.x + dx, robot_y + off.y + dy
 
     def believed(self, runs: Window) -> Window:
-        """Return the poses that the robot believes it has."""
+        """Return the poses that the robot believes to have."""
         lengths = np.diff(runs.step, append=runs.end)
         steps = np.arange(runs.first, runs.end, dtype=np.int64)
         x, y, turn = self.at(steps)
@@ -336,7 +337,7 @@ class Drift:
         return Window(runs.first, *(column[np.newaxis] for column in columns))
 
     def _jumps_at(self, interval: int) -> int:
-        """Return when the error jumps in an interval [us]; the interval's length if it doesn't."""
+        """Return the time of a jump within an interval [us]; the interval's length: no jump."""
         if kernels.random_uniform(self._keys["jumps"], interval) >= self._jump_chance:
             return self._every_us
         return int(kernels.random_below(self._keys["when"], interval, self._every_us))

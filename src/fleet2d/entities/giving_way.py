@@ -1,4 +1,4 @@
-"""Giving way: how plans go on when somebody is in the way.
+"""Giving way: the continuation of plans when somebody is in the way.
 
 A robot stops in front of people, waits, and goes around them or gives up. Any body waits for
 another one that blocks it, or goes around it. The rest of a plan is resumed from wherever the body
@@ -38,8 +38,8 @@ from fleet2d.kernels import (
 )
 from fleet2d.runtime.events import EventKind
 
-# Of the free cells that are by so many cells farther from a place than the nearest one at most, it
-# takes the one nearest to the body.
+# Of the free cells at most this many cells farther from a place than the nearest one, the one
+# nearest to the body is taken.
 NEARLY_CELLS = 3
 ANY_ROOM = -1
 Detour = Callable[[LatticePoint, LatticePoint], I64 | None]
@@ -48,8 +48,8 @@ Detour = Callable[[LatticePoint, LatticePoint], I64 | None]
 def resumed(plan: Plan, interrupted: Plan, step: int, detour: Detour | None = None) -> Plan | None:
     """Fill a plan with the rest of one that was interrupted.
 
-    The body goes straight to the next place at which it would have stopped. From there on all is as
-    it was planned, only later; of a stop that was interrupted, the remaining time.
+    The body goes straight to the next place at which it would have stopped. From there on, the plan
+    is the same, only later; an interrupted stop takes the remaining time.
 
     Args:
         plan: An empty plan that begins at the present step.
@@ -83,7 +83,7 @@ def without_next_stop(plan: Plan, interrupted: Plan, step: int) -> Plan | None:
         return None
     rest = _rest(plan, interrupted, int(time[stop + leaves[0]]))
     if rest is not None:
-        rest.root = rest  # a plan of its own: one stop of the interrupted one is missing
+        rest.root = rest  # one stop is missing, so this is a plan of its own
     return rest
 
 
@@ -128,20 +128,20 @@ def heading_at(track: Breakpoints, stop: int, time_us: int) -> int:
     return (int(headings[stop]) + turn * (time_us - begin) // max(end - begin, 1)) % TURN
 
 
-# Time between two looks whether the way is clear again: a tenth of the time waited so far, within
-# these limits.
+# A robot checks whether the way is clear after each tenth of the time waited so far, within these
+# limits.
 LOOK_INTERVALS = timedelta(seconds=1), timedelta(seconds=10)
-# A wait that begins this soon after another one continues it. For this long after going round
-# people begins, the robot may come as near to them as TOUCHING_GAP_M.
+# A wait that begins this soon after another one continues it. For this time after it begins to go
+# round people, a robot may come as near to them as TOUCHING_GAP_M.
 REPEATED_WAIT = timedelta(seconds=15)
-# Gap between the bodies at which it passes a person where there is no more room, and the gap below
-# which it counts as touching [m].
+# Gap at which a robot passes a person if there is no more room, and gap below which the bodies
+# count as touching [m].
 PASSING_GAP_M = 0.1
 TOUCHING_GAP_M = 0.03
 
 
 class Surroundings(NamedTuple):
-    """The people and obstacles around a robot that waits; it waits while they stay the same.
+    """The people and obstacles around a robot, which waits while they stay the same.
 
     Attributes:
         people: x and y of the people at home, and the distance between the middles at which the
@@ -164,16 +164,16 @@ class Surroundings(NamedTuple):
 class WaitForPeople:
     """The wait of a robot that has stopped in front of a person.
 
-    The steps at which it looks are fixed beforehand. A look is skipped if nothing has moved since
-    the one before, as its result is known: the plan to wait lasts until the first look that has a
-    result in any case, and `Clearance` ends it at an earlier look if somebody moves.
+    The steps of its looks are fixed beforehand. A look is skipped if nothing has moved since the
+    one before, so the plan to wait lasts until the first look with a result in any case;
+    `Clearance` ends it at an earlier look if somebody moves.
 
     Attributes:
-        interrupted: The plan that it was following.
-        step: The step at which it stopped following it.
-        since: The step at which it first stopped in front of a person.
+        interrupted: The interrupted plan.
+        step: The step of the interruption.
+        since: The step of the first stop in front of a person.
         interrupts: The events that interrupt that plan.
-        surroundings: The people and obstacles at its last look.
+        surroundings: The people and obstacles at the last look.
     """
 
     interrupted: Plan
@@ -183,14 +183,14 @@ class WaitForPeople:
     surroundings: Surroundings
 
     def look_from(self, step: int) -> int:
-        """Return the first step from `step` on at which it looks."""
+        """Return the step of the first look from `step` on."""
         look = self.step
         while look < step:
             look = self._look_after(look)
         return look
 
     def look_before(self, step: int) -> int:
-        """Return the last step before `step` at which it looked."""
+        """Return the step of the last look before `step`."""
         look = self.step
         while (after := self._look_after(look)) < step:
             look = after
@@ -202,22 +202,22 @@ class WaitForPeople:
         return look + max(-(-interval // self.interrupted.step_us), 1)
 
     def _waited(self, step: int) -> int:
-        """Return how long it has waited at a step [us]."""
+        """Return the time waited at a step [us]."""
         return (step - self.since) * self.interrupted.step_us
 
     def stand_still(self, now: Situation, person: str, gives_way: GivesWay) -> Plan:
         """Return a plan to stand still until the next look at whether the way is free.
 
-        At the latest it ends when the robot goes round the person, or gives up.
+        The plan ends when the robot goes round the person or gives up, at the latest.
         """
         plan = now.plan()
         look = self._look_after(now.step)
         patience = micros(gives_way.patience)
         if now.step == self.since:
             plan.note(EventKind.GIVES_WAY, person)
-        if self._waited(now.step) >= patience:  # it has already looked for a way round
+        if self._waited(now.step) >= patience:  # the robot has already looked for a way round
             patience = max(patience, micros(gives_way.gives_up))
-        # At its first look it may still turn towards its next leg.
+        # At the first look the robot may still turn towards its next leg.
         while self.interrupted.began[0] == now.step and self._waited(look) < patience:
             look = self._look_after(look)
         plan.stay_until(look * plan.step_us).interrupts = self.interrupts
@@ -232,7 +232,7 @@ class WaitForPeople:
 
         Args:
             now: The situation.
-            people: As `Surroundings.people`.
+            people: The people, as in `Surroundings.people`.
             distance: The gap to keep where there is room [m].
         """
         actor = now.actor
@@ -247,7 +247,7 @@ class WaitForPeople:
         return None
 
     def skip_stop(self, now: Situation, person: str) -> Plan | None:
-        """Return the plan without the stop that it can't get to; None if that was the last."""
+        """Return the plan without the blocked stop; None if that was the last."""
         plan = self.give_up(now, person)
         return self._with_interrupts(without_next_stop(plan, self.interrupted, self.step))
 
@@ -312,7 +312,7 @@ def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Not
     Args:
         now: The situation.
         interrupted: The present plan.
-        step: The step until which it stands.
+        step: The step until which the body stands.
         notes: Rows for the events table at the stop.
     """
     begin_us = now.step * interrupted.step_us
@@ -326,11 +326,11 @@ def plan_after(now: Situation, interrupted: Plan, step: int, notes: Sequence[Not
 
 
 def yielder(actor: Actor, beat_us: int = 1) -> Yielder:
-    """Return how a body goes somewhere to give way, for the core.
+    """Return the ways of a body that gives way, for the core.
 
     Args:
         actor: The body.
-        beat_us: If it is late, it leaves a stop at a multiple of that [us].
+        beat_us: A late body leaves a stop at a multiple of this time [us].
     """
     space = actor.space
     drives_plainly = actor.drive is None and not actor.slows
@@ -343,7 +343,7 @@ def yielder(actor: Actor, beat_us: int = 1) -> Yielder:
 def _way(
     actor: Actor, time_us: int, x: int, y: int, heading: int, to_x: int, to_y: int, discs: I64
 ) -> I64 | None:
-    """Return the breakpoints of a way by its drive, or from the border of its space, or None."""
+    """Return the breakpoints of a way by the drive, or from the border of the space, or None."""
     route = None
     if len(discs):
         route = RoutesAround(actor, discs)((x, y), (to_x, to_y))
@@ -359,7 +359,7 @@ def _way(
 
 
 def plan_along(now: Situation, interrupted: Plan, continued: Continued) -> Plan:
-    """Return a plan that goes on as the core found: it continues the present one, later."""
+    """Return the plan that the core found, which continues the present one later."""
     legs, end, delays = continued
     plan = now.plan().take("stand").go_on_along(legs, end)
     if not interrupted.is_random_walk:
@@ -378,16 +378,16 @@ def plan_around(
 ) -> Plan | None:
     """Return the rest of the present plan, by a way round other bodies to its next stop.
 
-    If a body stands at that stop, it stops beside it in the room. A body on a random walk turns
-    round, and its behavior is asked again.
+    If another body stands at that stop, this one stops beside it in the room. A body on a random
+    walk turns round, and its behavior is asked again.
 
     Args:
         now: The situation.
         interrupted: The present plan.
         timelines: The ways of all bodies.
         bodies: x and y of other bodies, and the distance to keep [lattice], int64 (n, 3).
-        met_at: The step in which they are in the way; left out: now.
-        waits_for: A place beside which it doesn't stop: its charger.
+        met_at: The step in which the other bodies are in the way; left out: now.
+        waits_for: A place beside which the body doesn't stop: its charger.
         beat_us: See `yielder`.
 
     Returns:
@@ -442,7 +442,7 @@ def _continue(
 ) -> Plan:
     """Continue a plan with the part of another one after a moment, delayed, and return it.
 
-    Rows for the events that were planned before that moment are written at it.
+    Notes planned before that moment are written at it.
 
     Args:
         plan: A plan that ends where the other one is at that moment; the delay is from that moment
@@ -468,7 +468,7 @@ def _continue(
 
 
 def _take_over(plan: Plan, interrupted: Plan, delays: Sequence[tuple[int, int, int, int]]) -> Plan:
-    """Let a plan have what another one would have done, delayed, and return it."""
+    """Let a plan take over the notes and postures of another one, delayed, and return it."""
     after_us = delays[0][0]
     if interrupted.postures or any(note.time_us > after_us for note in interrupted.notes):
         _repeat_later(plan, interrupted, [Delay(*delay) for delay in delays])
@@ -506,7 +506,7 @@ def beside(
 ) -> LatticePoint | None:
     """Return a free place nearest to an occupied one, in its room; None if there is none.
 
-    Of several that are about as near, it is the one nearest to the body.
+    Of several places about as near, take the one nearest to the body.
     """
     plan = actor.home.plan
     room = int(plan.room_of_cell[goal[1] // SUB, goal[0] // SUB]) if in_room else ANY_ROOM

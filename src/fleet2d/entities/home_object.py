@@ -15,7 +15,7 @@ from fleet2d.runtime.clock import DAY
 class HomeObject(Component):
     """An object of the home with a state: a door, a sensor.
 
-    Furniture that just stands there is part of the floor plan.
+    Furniture without a state is part of the floor plan.
     """
 
     kind = "object"
@@ -25,7 +25,7 @@ class Turn(Settings):
     """A change of a door at a time of day, every day.
 
     Attributes:
-        at: When, every day.
+        at: The time of day.
         open: Open it, or shut it.
         locked: Lock it, or unlock it.
     """
@@ -44,7 +44,7 @@ class Door(HomeObject):
     """A door: while it is shut, it blocks sight and ways exactly like a wall.
 
     People open it as they come to it, unless it is locked; for bodies with `opens_doors: false`,
-    such as robots, it is a wall. It never shuts on a body: it waits until the doorway is free.
+    such as robots, it is a wall. A door never shuts on a body, but waits until the doorway is free.
 
     Attributes:
         doorway: Its doorway: by name, by a room that has one only, by 'room-room', or the one
@@ -53,7 +53,7 @@ class Door(HomeObject):
         locked: Whether it is locked at first, so that nobody can open it by hand.
         closes_after: It shuts this long after somebody opened it or went through; left out: it
             stays as it was left.
-        schedule: When it is opened, shut or locked, every day.
+        schedule: The times at which it is opened, shut or locked, every day.
     """
 
     doorway: str | Point = Field(examples=["bathroom_1", "kitchen_1-hallway_1", [4.0, 2.5]])
@@ -109,7 +109,7 @@ def doorways_named(plan: FloorPlan, name: str) -> list[Doorway]:
 
 
 def door_hint(plan: FloorPlan, name: str) -> str:
-    """Return how to add a door to a doorway of a plan in a scenario, for messages."""
+    """Return advice on adding a door to a doorway of a plan, for messages."""
     names = [doorway.name for doorway in plan.doorways]
     if not names:
         return ""

@@ -1,4 +1,4 @@
-"""Keeping out: where a robot never is, at all times, at hours, or by its belief."""
+"""Keeping out: zones that a robot avoids at all times, at hours, or by its belief."""
 
 from collections.abc import Iterator
 from datetime import datetime
@@ -56,7 +56,7 @@ class _Place(Settings):
 
 
 _WHILE: Any = Literal["asleep"] | None
-_KEYWORDS: Any = {"while": (_WHILE, None)}  # no name that a class may write
+_KEYWORDS: Any = {"while": (_WHILE, None)}  # `while` is no name for a field of a class
 KeptOut: Any = create_model(
     "KeptOut",
     __base__=_Place,
@@ -90,9 +90,9 @@ class TimedZones(NamedTuple):
     """Zones that a robot keeps out of at some hours or by its belief.
 
     Attributes:
-        zones: Their numbers: see `Home.area`.
+        zones: The numbers of the zones: see `Home.area`.
         during: The hours; none: at all times.
-        asleep: Whether it does only in those in which it believes that somebody sleeps.
+        asleep: Whether only zones count in which the robot believes that somebody sleeps.
     """
 
     zones: frozenset[int]
@@ -101,19 +101,19 @@ class TimedZones(NamedTuple):
 
     @property
     def about(self) -> str:
-        """When it does, for notes."""
+        """The times of keeping out, for notes."""
         hours = ", ".join(span.text for span in self.during)
         about = f" {hours}" if hours else ""
         return f"{about} while somebody sleeps" if self.asleep else about
 
 
 class KeepOutRules:
-    """What a robot's `keep_out` means in its home.
+    """The zones of a robot's `keep_out` in its home.
 
     Attributes:
-        always: The zones that it never enters.
+        always: The zones that the robot never enters.
         no_stops: The rooms through which it may pass.
-        timed: The others.
+        timed: The other zones, with their times.
     """
 
     def __init__(self, body: "Body", entries: tuple[Any, ...]) -> None:
@@ -147,7 +147,7 @@ class KeepOutRules:
 
         Args:
             time: The time.
-            sleepers: The rooms in which it believes that somebody sleeps.
+            sleepers: The rooms in which the robot believes that somebody sleeps.
         """
         zones = frozenset[int]()
         for timed in self.timed:
@@ -181,7 +181,7 @@ def _zones(body: "Body", entry: Any) -> frozenset[int]:
 
 
 class SleepMemory:
-    """Where a robot last saw each person, and whether the person was lying."""
+    """The room in which a robot last saw each person, and whether the person was lying."""
 
     def __init__(self, plan: FloorPlan) -> None:
         self._plan = plan
@@ -189,7 +189,7 @@ class SleepMemory:
 
     @property
     def rooms(self) -> frozenset[int]:
-        """The rooms in which it believes that somebody sleeps."""
+        """The rooms in which the robot believes that somebody sleeps."""
         lying_in = (room for room, lies in self._last.values() if lies)
         return frozenset(room for room in lying_in if room is not None)
 

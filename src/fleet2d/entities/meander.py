@@ -10,7 +10,7 @@ from fleet2d.entities.behavior import Actor, Behavior, Situation
 from fleet2d.entities.plan import Plan
 from fleet2d.kernels import BELL_STD, TURN, WalkRule
 
-# A step longer than any home is never possible; this limit keeps products within 64 bits.
+# This limit, a step longer than any home, keeps products within 64 bits.
 MAX_STRIDE = 256 << 21
 
 

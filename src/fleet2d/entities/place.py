@@ -1,4 +1,4 @@
-"""Places: rooms, furniture and points as a scenario names them, and where a body stops for one.
+"""Places: rooms, furniture and points as a scenario names them, and the points to stop at.
 
 A scenario names a kind ("bathroom", "sofa") or a single place ("bathroom_1", a point). A kind that
 this home lacks, or that the body can't reach, is left out as long as another place remains; the
@@ -66,7 +66,7 @@ def parse_place(value: object) -> RoomChoice | Point:
 
 
 def _is_coordinate(value: Any) -> bool:
-    """Whether a value is a coordinate within 1000 km [m]; NaN is none."""
+    """Return whether a value is a coordinate within 1000 km [m]; NaN is none."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
     size: Any = abs(value)
@@ -120,7 +120,7 @@ def matching_rooms(
     never_in: RoomChoice = (),
     stands_in: bool = False,
 ) -> tuple[str, list[Room]]:
-    """Return the first name that matches a reachable room, and all reachable rooms it matches.
+    """Return the first name that matches a reachable room, and all reachable rooms that match.
 
     Args:
         names: Rooms and kinds of rooms to try in turn.
@@ -198,7 +198,7 @@ def _owned(body: "Body", kind: str, person: str) -> PlacedObject | None:
             f"there is no user {person!r} who could have a {kind}"
             f"{did_you_mean(person, body.people)}"
         )
-    owner = body.people[person] or body  # not built yet; asked again when somebody goes there
+    owner = body.people[person] or body  # one not built yet is asked again when somebody goes there
     return owner.own_furniture(kind) or furniture_of(owner, (kind,))
 
 
@@ -236,7 +236,7 @@ def _gets_to(body: "Body", thing: PlacedObject) -> bool:
     use = thing.uses[0]
     lattice = body.home.lattice
     at_x, at_y = lattice.point_at(use.approach or use.at)
-    # Within a metre, if the place itself is too tight: not from another room behind a wall.
+    # If the place itself is too tight, a point within a metre does, but none behind a wall.
     return (x - at_x) ** 2 + (y - at_y) ** 2 <= lattice.units_per_m**2
 
 
@@ -343,7 +343,7 @@ def points_at_distance(
         body: The body.
         center: The point [lattice].
         distance: The distance [lattice].
-        directions: How many directions are tried, evenly spaced.
+        directions: Number of directions that are tried, evenly spaced.
     """
     plan = body.home.plan
     space = body.space
@@ -371,7 +371,7 @@ class Nearest:
     def of(self, points: I64) -> I64:
         """Return the centre nearest to each point, int64 (n, 2).
 
-        Of several at the same distance, the one of the lowest row, then of the lowest column.
+        Of several at the same distance, return that of the lowest row, then of the lowest column.
         """
         if not len(points) or not len(self.centres):
             return np.empty((0, 2), np.int64)

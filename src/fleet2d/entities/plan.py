@@ -24,14 +24,14 @@ from fleet2d.runtime.events import KINDS, EventKind
 
 
 class Note(NamedTuple):
-    """A row that a plan adds to the events table: when, what, and any detail of it."""
+    """A row that a plan adds to the events table: its time, kind and detail."""
 
     time_us: int
     event: str
     detail: str
 
 
-# Makes a note from a tuple of its fields without calling Python code, as plans have many.
+# Plans have many notes: this makes one from a tuple of its fields without calling Python code.
 new_note: Callable[[tuple[int, str, str]], Note] = partial(tuple.__new__, Note)
 
 PlanEnd = tuple[int, int, int, int, int]
@@ -48,12 +48,13 @@ class Plan:
         began: The step at which it begins, and the state of the body then.
         time_us: The moment up to which it is planned [us since the start].
         legs: Its breakpoints so far.
-        notes: What happens on the way, for the events table.
+        notes: Events on the way, for the events table.
         interrupts: Events that end the plan early.
         asks_us: The latest time at which the behavior is asked again [us since the start]; None: at
             the plan's end.
         posture: The posture of the body at the end of the plan.
-        postures: When the posture changes [us since the start], and its number in POSTURES then.
+        postures: Times at which the posture changes [us since the start], with its number in
+            POSTURES.
     """
 
     def __init__(self, body: Body, step: int) -> None:
@@ -62,7 +63,7 @@ class Plan:
         self.began = (step, state)
         self.legs = Legs()
         self._motion: Motion | None = None
-        self._over: tuple[int | None] | None = None  # `over_at`, once it is complete
+        self._over: tuple[int | None] | None = None  # `over_at` of a complete plan
         self.time_us = step * body.clock.step_us
         self.x, self.y, self.heading, self.away = state
         self.notes: list[Note] = []
@@ -82,7 +83,7 @@ class Plan:
 
     @root.setter
     def root(self, plan: "Plan") -> None:
-        # A reference to itself would keep it until Python looks for garbage.
+        # A reference to itself would keep the plan until the next garbage collection.
         self._root = None if plan is self else plan
 
     @property
@@ -92,7 +93,7 @@ class Plan:
 
     @property
     def end(self) -> PlanEnd:
-        """Where it ends so far: the moment, and the pose there."""
+        """The end so far: the moment, and the pose there."""
         return self.time_us, self.x, self.y, self.heading, self.away
 
     @end.setter
@@ -101,12 +102,12 @@ class Plan:
 
     @property
     def position(self) -> LatticePoint:
-        """Where the body is at its end so far [lattice]."""
+        """The position of the body at the end so far [lattice]."""
         return self.x, self.y
 
     @property
     def time(self) -> datetime:
-        """The local time up to which it is planned."""
+        """The local time of the end so far."""
         return self.body.clock.start + timedelta(microseconds=self.time_us)
 
     def go_to(
@@ -215,7 +216,7 @@ class Plan:
 
         Args:
             thing: An object of the home, or its name.
-            place: Which of its places, by number, modulo how many it has.
+            place: The number of one of its places, modulo their count.
 
         Raises:
             PlacementError: There is no such object, or no place to use it from.
@@ -248,7 +249,7 @@ class Plan:
         return next((code for time, code in changes if time <= time_us), self._posture_before)
 
     def posture_times(self) -> tuple[I64, I8]:
-        """Return when the posture changes [us], int64 (n,), and the postures, int8 (n + 1,)."""
+        """Return times of changes of posture [us], int64 (n,), and the postures, int8 (n + 1,)."""
         if not self.postures and self._posture_before == 0:
             return STANDING
         codes = [self._posture_before, *(code for _, code in self.postures)]
@@ -289,7 +290,7 @@ class Plan:
         return self
 
     def go_on_along(self, legs: Legs, end: PlanEnd) -> Self:
-        """Follow breakpoints of the core instead of all so far: they begin where the plan does.
+        """Follow breakpoints of the core from the plan's beginning, in place of those so far.
 
         Args:
             legs: The breakpoints.
@@ -331,7 +332,7 @@ class Plan:
     def stay(self, duration: timedelta | None = None, *, until: datetime | None = None) -> Self:
         """Stay for a duration, or until a local time; without either, for good.
 
-        Until a time that is past, it doesn't stay at all.
+        A past time means not to stay at all.
 
         Raises:
             ComponentError: The duration is negative, or longer than 1000 years.
@@ -392,7 +393,7 @@ class Plan:
         return self
 
     def note(self, event: str, detail: str = "") -> Self:
-        """Add a row to the events table, at the moment up to which it is planned.
+        """Add a row to the events table, at the present end of the plan.
 
         Raises:
             ComponentError: Neither Fleet2D nor a behavior of the body declares such events.
@@ -437,7 +438,7 @@ class Plan:
 
     @property
     def over_at(self) -> int | None:
-        """The step at which it is over, after the one at which it begins; None: never."""
+        """The step at which the plan is over, after its first one; None: never."""
         return self._over_at() if self._over is None else self._over[0]
 
     def _over_at(self) -> int | None:
@@ -446,21 +447,21 @@ class Plan:
             end_us = self.time_us if end_us is None else min(end_us, self.time_us)
         if end_us is None:
             return None
-        # Else a behavior would be asked forever at one step for plans that take no time.
+        # Without this, a behavior whose plans take no time would be asked forever at one step.
         return max(self.body.clock.step_at_or_after(end_us), self.began[0] + 1)
 
     def is_over(self, step: int) -> bool:
-        """Return whether it is over at a step."""
+        """Return whether the plan is over at a step."""
         end = self.over_at
         return end is not None and end <= step
 
     @property
     def is_random_walk(self) -> bool:
-        """Whether its motion isn't known beforehand."""
+        """Whether the motion is a random walk."""
         return isinstance(self._motion, RandomWalk)
 
     def finish(self) -> Motion:
-        """Return the motion of the plan, which is complete."""
+        """Complete the plan, and return its motion."""
         if self._motion is None:
             self._motion = Track(Breakpoints(*self.legs.track()), self.step_us)
         self._over = (self._over_at(),)
@@ -506,7 +507,7 @@ def check_data(data: dict[str, Any]) -> dict[str, Any]:
     """Return `data` if `plan_of` can read it: an edited manifest may hold anything.
 
     Raises:
-        PydanticCustomError: It describes no plan.
+        PydanticCustomError: The data describes no plan.
     """
     try:
         _PlanForm.model_validate(data)
@@ -516,7 +517,7 @@ def check_data(data: dict[str, Any]) -> dict[str, Any]:
 
 
 class _PlanForm(BaseModel):
-    """The form of what `data_of` returns."""
+    """The form of a plan from `data_of`."""
 
     model_config = ConfigDict(strict=True, extra="forbid", defer_build=True)
 
@@ -533,8 +534,8 @@ def plan_of(body: Body, step: int, data: Mapping[str, Any]) -> Plan:
     """Return the plan that `data` describes, for a body to follow from a step on.
 
     Raises:
-        ComponentError: It leads out of the floor plan, goes back in time, or waits for what can't
-            happen.
+        ComponentError: The plan leads out of the floor plan, goes back in time, or waits for an
+            impossible event.
     """
     plan = Plan(body, step)
     if data["walk"] is not None:

@@ -1,4 +1,4 @@
-"""Power of robots: when they crash and update, and what they keep while they are off."""
+"""Power of robots: crashes and updates, and the memory that outlasts being off."""
 
 from datetime import timedelta
 from typing import Any, Literal
@@ -23,12 +23,12 @@ KEPT = (MAP, PLACE)
 
 
 class Updates(Settings):
-    """Updates of a robot's software, while which it is off: at a drawn time within some hours.
+    """Updates of a robot's software, during which it is off, at a drawn time within some hours.
 
     Attributes:
         during: The hours, like 02:00-04:00; on the days of the week that they name.
-        lasts: How long the robot is off.
-        every: Time from one to the next, in whole days; the first is in the first such hours.
+        lasts: Time for which the robot is off.
+        every: Time between updates, in whole days; the first is in the first such hours.
 
     Example:
         >>> Updates(during="02:00-04:00", every="7 d").lasts
@@ -40,7 +40,7 @@ class Updates(Settings):
     every: PositiveDuration = DAY
 
     def model_post_init(self, _: object, /) -> None:
-        """Refuse hours that are several or too short, and parts of days."""
+        """Refuse several or too short hours, and parts of days."""
         if len(self.during) != 1:
             raise problem_at(("during",), "give the hours of one span, like '02:00-04:00'")
         if self.lasts > self.during[0].end - self.during[0].begin:
@@ -66,17 +66,17 @@ class Updates(Settings):
 
 
 class Power(Settings):
-    """When a robot crashes or updates, and what it still knows when it is on again.
+    """The crashes and updates of a robot, and the memory that outlasts them.
 
-    Without it, a robot is off when its battery is empty, or when somebody switches it off; then it
-    keeps all that it has learned and loses what is about the present.
+    Without these settings, a robot is off only when its battery is empty, or when somebody switches
+    it off; it keeps all that it has learned, but nothing about the present.
 
     Attributes:
         persists: What outlasts its time off: names of algorithms, `map` (which cells it has seen)
             and `place` (where it is); left out: all. All others begin anew. Algorithms of the
             present, such as `rtp`, keep only what they have learned in any case.
-        crashes: When it crashes, and how long until it is on again.
-        updates: When its software is updated.
+        crashes: The crashes, and the time until it is on again.
+        updates: The updates of its software.
 
     Example:
         >>> Power(persists=["ltp", "map"], crashes={"per_day": 0.2, "lasts": "1 min"}).persists
@@ -88,7 +88,7 @@ class Power(Settings):
     updates: Updates | None = None
 
     def keeps(self, name: str) -> bool:
-        """Whether something outlasts its time off."""
+        """Return whether something outlasts being off."""
         return self.persists is None or name in self.persists
 
 
@@ -97,6 +97,6 @@ KEEPS_ALL = Power()
 
 
 def power_of(entity: Any) -> Power:
-    """Return how a body keeps its power."""
+    """Return the power settings of a body."""
     power: Power | None = getattr(entity, "power", None)
     return power or KEEPS_ALL

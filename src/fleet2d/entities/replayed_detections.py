@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from fleet2d.logs.detections import RobotDetections
 
 
-# Labels that mean nobody known in usual detectors.
+# Labels of usual detectors for people who aren't identified.
 ANONYMOUS = frozenset({"unknown", "person", "people", "human", "none", "nobody", "0", ""})
 
 
 class ReplayedDetections(EvidenceSource, LogKeys):
-    """Perceive what a real robot perceived: the detections in a table, or on a topic of a bag.
+    """Perceive the detections of a real robot, from a table or a topic of a bag.
 
-    Detections replace simulated sight for algorithms, behaviors and metrics. Who was really there
-    is unknown, so metrics that compare with the truth leave these observations out, and say how
-    many they are. A detection outside of the home by more than `reach` is left out and counted; if
-    more than half of them are, the log is refused.
+    Detections replace simulated sight for algorithms, behaviors and metrics. The true people are
+    unknown, so metrics that compare with the truth leave these observations out, and give their
+    number. A detection outside of the home by more than `reach` is left out and counted; if more
+    than half of them are, the log is refused.
 
     Attributes:
         path: The table (.csv, .parquet, .jsonl), or the bag.
@@ -66,9 +66,10 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         """Read the log.
 
         Raises:
-            LogError: It can't be read, has labels of nobody, or doesn't fit the home or the run.
+            LogError: The log can't be read, has labels of nobody, or doesn't fit the home or the
+                run.
         """
-        # Imported here, as it needs more of pyarrow than most runs.
+        # The module needs more of pyarrow than most runs, so it is imported here.
         from fleet2d.logs.detections import read_detections
 
         is_robots = self.relative and is_bag(self.path)
@@ -108,7 +109,7 @@ class ReplayedDetections(EvidenceSource, LogKeys):
             if count := int((identity[used] == number).sum()):
                 notes.append(f"{count} detections of {name}")
         self.notes = tuple(notes)
-        rows = np.zeros((int(used.sum()), SIGHTING), np.int64)  # by camera 0, standing
+        rows = np.zeros((int(used.sum()), SIGHTING), np.int64)  # zeros: camera 0, standing people
         lattice = actor.home.lattice
         places = np.clip(xy[used], -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
         if self.relative:
@@ -128,7 +129,7 @@ class ReplayedDetections(EvidenceSource, LogKeys):
         """Return which detections are in the home, within `reach`.
 
         Raises:
-            LogError: More than MAX_OUTSIDE of those in the run are not.
+            LogError: More than MAX_OUTSIDE of the detections in the run are outside.
         """
         free = actor.home.plan.free_space
         shapely.prepare(free)
@@ -169,8 +170,8 @@ def identities(
 
     Args:
         labels: The labels of a log.
-        counts: How many detections have each.
-        people: The scenario's choices.
+        counts: Number of detections with each label.
+        people: The users chosen in the scenario, by label.
         users: The users of the run.
 
     Raises:

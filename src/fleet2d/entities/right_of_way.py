@@ -9,8 +9,8 @@ from fleet2d.entities.behavior import Actor
 class RightOfWay(Component):
     """The rule by which one of two robots yields to the other.
 
-    People, logs and real bodies never yield, whatever the rule is. It is asked whenever a body
-    begins a plan, and must follow from its arguments alone.
+    People, logs and real bodies never yield, whatever the rule is. The rule is asked whenever a
+    body begins a plan, and must depend on its arguments alone.
 
     Example:
         >>> class Heavier(RightOfWay):
@@ -22,7 +22,7 @@ class RightOfWay(Component):
     """
 
     kind = "right_of_way"
-    # Whether the answers are the same during a whole run: then it is asked once.
+    # Whether the answers are the same during a whole run, so that the rule is asked once.
     is_fixed: ClassVar[bool] = False
 
     def goes_first(self, one: Actor, other: Actor) -> bool:
@@ -36,7 +36,7 @@ class Listed(RightOfWay):
     is_fixed = True
 
     def goes_first(self, one: Actor, other: Actor) -> bool:
-        """Let the first one go."""
+        """Return True: the first robot in the scenario goes first."""
         return True
 
 

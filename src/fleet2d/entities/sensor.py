@@ -1,4 +1,4 @@
-"""What all sensors are: how they notice bodies, their readings, and their state between spans."""
+"""Sensors: the base of all, their readings, and their state between spans."""
 
 from dataclasses import dataclass
 from datetime import timedelta
@@ -18,10 +18,10 @@ SensorFault = Literal["on", "off", "silent"]
 
 
 class SensorFailures(Failures):
-    """When a sensor fails, and how.
+    """The failures of a sensor, with their effect.
 
     Attributes:
-        says: It reports nothing (`silent`), or is always or never triggered (`on`, `off`).
+        says: The effect: no reports (`silent`), or always or never triggered (`on`, `off`).
     """
 
     says: SensorFault = "silent"
@@ -33,7 +33,7 @@ class SensorReading(NamedTuple):
     Attributes:
         step: The step at which it goes on or off.
         on: Whether it goes on.
-        user: The index of the user that it noticed; -1: none.
+        user: The index of the noticed user; -1: none.
     """
 
     step: int
@@ -51,7 +51,7 @@ class SensorView:
             the first step of a run, that step itself), column j + 1 is step first + j.
         y: Likewise.
         present: Whether the body is at home, bool (bodies, steps + 1).
-        users: How many of the rows are users.
+        users: The number of rows that are users.
     """
 
     first: int
@@ -69,33 +69,32 @@ class SensorView:
 class Sensor(HomeObject):
     """Base of sensors: a subclass implements `sense`, which returns the steps that trigger it.
 
-    The readings follow from that: the sensor goes on with the first of those steps, and off after
-    its `hold` without any.
+    The sensor goes on with the first of these steps, and off after its `hold` without any.
 
     Attributes:
-        room: The room that its readings name; left out: where it is.
-        fails: When it fails; null: never.
+        room: The room in its readings; left out: the room that it is in.
+        fails: Its failures; null: none.
     """
 
     room: str | None = Field(default=None, min_length=1)
     fails: SensorFailures | None = None
 
-    # Names of its two states in the table of readings.
+    # The names of the two states in the table of readings.
     words: ClassVar[tuple[str, str]] = ("ON", "OFF")
 
     def start(self, home: Home, step_us: int) -> None:
-        """Prepare for a run; check here that the object that it watches exists."""
+        """Prepare for a run, and check that the watched object exists."""
 
     def place(self, home: Home) -> str:
-        """Return the name of the room that its readings name."""
+        """Return the name of the room in the readings."""
         raise NotImplementedError
 
     def hold_us(self) -> int:
-        """Return how long it stays on after the last step that triggers it [us]: its `hold`."""
+        """Return the time for which the sensor stays on after its last trigger [us]: its `hold`."""
         return micros(getattr(self, "hold", timedelta(0)))
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
-        """Return the steps that trigger it, ascending, and the user of each; int64 (n,) each."""
+        """Return the triggering steps, ascending, and the user of each: int64 (n,) each."""
         raise NotImplementedError
 
 
@@ -119,7 +118,7 @@ class SensorState:
     """The state of a sensor between spans.
 
     Attributes:
-        hold: How many steps it stays on after the last one that triggers it.
+        hold: Number of steps for which it stays on after the last trigger.
         on: Whether it is on.
         last: The last step that triggered it.
         user: The index of the user that switched it on; -1: none.
@@ -132,7 +131,7 @@ class SensorState:
         self.user = -1
 
     def read(self, steps: I64, users: I64, end: int) -> list[SensorReading]:
-        """Return the readings before step `end`, given the steps that trigger it, and their users.
+        """Return the readings before step `end`, given the triggering steps, and their users.
 
         Args:
             steps: Ascending, int64 (n,).
@@ -140,7 +139,7 @@ class SensorState:
             end: The step after the span.
         """
         readings: list[SensorReading] = []
-        # It stays on between steps no farther apart than its hold.
+        # The sensor stays on between triggers no farther apart than its hold.
         quiet = np.flatnonzero(np.diff(steps) > self.hold + 1)
         begins = [0, *(quiet + 1).tolist()] if len(steps) else []
         ends = [*quiet.tolist(), len(steps) - 1]
@@ -165,8 +164,8 @@ class FurnitureSensor(Sensor):
     """Base of sensors of an object of the floor plan, in whose room they are.
 
     Attributes:
-        of: The object of the floor plan that it is in, by name.
-        hold: It turns off when nobody has been there for this long.
+        of: The name of the object of the floor plan that it is in.
+        hold: Time without anybody there after which it turns off.
     """
 
     of: str
@@ -177,7 +176,7 @@ class FurnitureSensor(Sensor):
         home.object(self.of)
 
     def place(self, home: Home) -> str:
-        """Return the room that the object stands in; empty if it is in none."""
+        """Return the room of the object; empty if it is in none."""
         middle = home.object(self.of).footprint.centroid
         room = home.plan.room_at(middle.x, middle.y)
         return room.name if room else ""

@@ -1,4 +1,4 @@
-"""Sensors of a home: of doors, seats, appliances and motion, real ones, and those of a log."""
+"""Sensors of doors, seats, appliances and motion, real sensors, and sensors from a log."""
 
 from dataclasses import replace
 from datetime import timedelta
@@ -50,7 +50,7 @@ class ContactSensor(Sensor):
     words = ("OPEN", "CLOSE")
 
     def watch(self, door: int) -> None:
-        """Set the door that it watches, by its number in the home."""
+        """Set the watched door, by its number in the home."""
         self.door = door
 
     def place(self, home: Home) -> str:
@@ -91,9 +91,9 @@ class SmartPlug(FurnitureSensor):
     Passing by doesn't switch it on: the person has to stay on the spot for two steps.
 
     Attributes:
-        of: The object of the floor plan that it feeds, by name.
-        reach: How near to such a place counts as using the device.
-        hold: It turns off when nobody has used it for this long.
+        of: The name of the powered object of the floor plan.
+        reach: Distance from such a place that counts as using the device.
+        hold: Time without use after which it turns off.
     """
 
     of: str
@@ -124,16 +124,16 @@ class SmartPlug(FurnitureSensor):
 
 
 class MotionSensor(Sensor):
-    """A sensor that is on while a person moves in view, with no wall between, and a while longer.
+    """A sensor that is on while a person moves in view of it, and for a while longer.
 
     It doesn't notice people who stand, sit or lie still.
 
     Attributes:
-        at: Where it hangs, [x, y] in metres.
-        heading_deg: Where it looks, counter-clockwise from +x.
+        at: Its position, [x, y] in metres.
+        heading_deg: Its direction of view, counter-clockwise from +x.
         angle_deg: Width of its field of view.
-        range: How far it sees.
-        hold: It turns off when nobody has moved for this long.
+        range: Its range.
+        hold: Time without motion after which it turns off.
         robots: Whether robots trigger it, too.
     """
 
@@ -145,7 +145,7 @@ class MotionSensor(Sensor):
     robots: bool = False
 
     def start(self, home: Home, step_us: int) -> None:
-        """Compute its position on the lattice."""
+        """Compute the sensor's position on the lattice."""
         if home.plan.room_at(*self.at) is None:
             raise PlacementError(
                 f"({self.at[0]:g}, {self.at[1]:g}) m is outside the home: hang the sensor in a room"
@@ -155,7 +155,7 @@ class MotionSensor(Sensor):
         self.version = -1
 
     def place(self, home: Home) -> str:
-        """Return the room that it hangs in."""
+        """Return the room of the sensor."""
         room = home.plan.room_at(*self.at)
         return room.name if room else ""
 
@@ -191,7 +191,7 @@ class MotionSensor(Sensor):
         if half >= TURN:
             return np.ones(len(dx), np.bool_)
         middle = 2 * round(self.heading_deg / 360 * TURN)
-        quarter = TURN // 2  # of a turn, in halves of a heading
+        quarter = TURN // 2  # a quarter turn, in halves of a heading
         right = middle - half
         left = middle + half
         from_right = half_sine(right + quarter) * dy - half_sine(right) * dx >= 0
@@ -200,7 +200,7 @@ class MotionSensor(Sensor):
 
 
 class LiveSensor(Sensor):
-    """A real sensor: it is on or off as an intervention `report` says; see `fleet2d live`.
+    """A real sensor, which an intervention `report` turns on or off; see `fleet2d live`.
 
     Attributes:
         room: The room that its readings name.
@@ -220,8 +220,8 @@ class LiveSensor(Sensor):
 class ReplaySensor(Sensor, LogKeys):
     """A real sensor, whose readings are replayed from a table.
 
-    Where it is `unavailable` or `unknown`, as Home Assistant writes it, it counts as off, and a
-    note says for how long.
+    A state of `unavailable` or `unknown`, as in Home Assistant, counts as off, and a note says for
+    how long.
 
     Attributes:
         path: The table (.csv, .parquet, .jsonl) with a row for each change of its state.
@@ -238,14 +238,15 @@ class ReplaySensor(Sensor, LogKeys):
     day: Day = 0
 
     def files(self) -> tuple[Path, ...]:
-        """Return the file that it reads."""
+        """Return the file to read."""
         return (self.path,)
 
     def read(self, clock: Clock) -> None:
         """Read the table.
 
         Raises:
-            LogError: It can't be read, lacks a column, has no such sensor, or a state is unknown.
+            LogError: The table can't be read, lacks a column, has no such sensor, or a state is
+                unknown.
         """
         from fleet2d.logs.tables import LogTable
 
@@ -263,7 +264,7 @@ class ReplaySensor(Sensor, LogKeys):
         chosen = np.ones(count, bool)
         if "sensor" in table.named:
             chosen = table.rows_of("sensor", self.sensor)
-        # The table may be of many sensors: its days, and its end, are those of all.
+        # The table may have many sensors, and its days and its end are those of all.
         whole = stamps.local(self.path, "rows", np.ones(count, bool), [], time_zone=zone, sort=True)
         nothing = np.zeros((count, 2))
         log = PositionLog(
@@ -290,7 +291,7 @@ class ReplaySensor(Sensor, LogKeys):
             self.notes += (f"off for {gap} of the run in which it is unavailable or unknown",)
 
     def sense(self, view: SensorView, home: Home) -> tuple[I64, I64]:
-        """Return the steps at which it is on, caused by nobody known."""
+        """Return the steps at which the sensor is on, without known users."""
         steps = np.arange(view.first, view.first + view.steps, dtype=np.int64)
         row = np.searchsorted(self._steps, steps, side="right") - 1
         on = steps[(row >= 0) & self._on[row]]

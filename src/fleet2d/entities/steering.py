@@ -1,7 +1,7 @@
-"""Steering: how a robot moves whose velocity another program commands, as by a joystick.
+"""Steering: the motion of a robot whose velocity another program or a joystick commands.
 
 The path is computed in pieces of equal time, each with one speed and one rate of turning, from
-integers and the sines of the core: it is the same on every machine.
+integers and the sines of the core, so it is the same on every machine.
 """
 
 import math
@@ -19,21 +19,21 @@ from fleet2d.entities.plan import Plan
 from fleet2d.entities.robots.drives import Holonomic, Trapezoidal
 from fleet2d.kernels import I64, TURN, UNIT, cosine, sine
 
-# Within a piece the speed is constant, and the way straight.
+# Within a piece of this length, the speed is constant and the way straight.
 PIECE_US = 50_000
-# So far apart are the points of a way at which walls and bodies are looked for [m].
+# Walls and bodies are looked for at points of a way this far apart [m].
 SPACING_M = 0.01
-# Within an order, places and headings are kept so many times finer than the lattice.
+# Within an order, places and headings have this many times the resolution of the lattice.
 FINE = 1 << 16
 
 
 class Velocity(NamedTuple):
-    """How fast a robot moves, in its own frame.
+    """The velocity of a robot, in its own frame.
 
     Attributes:
-        forward: Ahead, or back if negative [m/s].
-        left: To its left; 0 unless its drive is holonomic [m/s].
-        turn_deg: Counter-clockwise [deg/s].
+        forward: Speed ahead, or back if negative [m/s].
+        left: Speed to the left; 0 unless the drive is holonomic [m/s].
+        turn_deg: Rate of turning, counter-clockwise [deg/s].
     """
 
     forward: float = 0.0
@@ -41,7 +41,7 @@ class Velocity(NamedTuple):
     turn_deg: float = 0.0
 
     def within_limits(self, body: Body) -> "Velocity":
-        """Return the nearest velocity that a robot can reach: the direction stays as it is."""
+        """Return the nearest velocity within a robot's limits, in the same direction."""
         left = self.left if isinstance(body.drive, Holonomic) else 0.0
         speed = _length(self.forward, left)
         share = min(1.0, body.entity.speed / speed) if speed else 0.0
@@ -59,14 +59,14 @@ class Velocity(NamedTuple):
 
 
 class Disc(NamedTuple):
-    """Where the centre of a robot must not be: about another body [lattice]."""
+    """A disc about another body in which a robot's centre must not be [lattice]."""
 
     x: int
     y: int
     reach: int
 
     def blocks(self, old: tuple[int, int], new: tuple[int, int]) -> bool:
-        """Whether a move ends within reach of it, and no farther from it than it begins."""
+        """Return whether a move ends within the disc, no farther from its centre than before."""
         after = self._squared_distance(*new)
         return after < self.reach**2 and after <= self._squared_distance(*old)
 
@@ -75,12 +75,12 @@ class Disc(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a steered robot is.
+    """The state of a steered robot.
 
     Attributes:
-        velocity: How fast it would move were nothing in its way.
-        rest: What rounding to the lattice has left over: x, y [1/FINE lattice], heading [1/FINE of
-            1/4096 turn]. Else a slow robot would lose a part of each command.
+        velocity: The velocity if nothing were in its way.
+        rest: The remainder of rounding to the lattice, which a slow robot would lose otherwise: x,
+            y [1/FINE lattice], heading [1/FINE of 1/4096 turn].
     """
 
     velocity: Velocity = Velocity()
@@ -92,13 +92,13 @@ AT_REST = Progress()
 
 @dataclass
 class Steering:
-    """The order to move at a velocity for a while; it ends at walls and in front of bodies.
+    """The order to move at a velocity for a while, stopping at walls and in front of bodies.
 
     Attributes:
-        velocity: The velocity that is wanted.
-        duration: How long it is kept.
+        velocity: The desired velocity.
+        duration: Time for which it is kept.
         others: The bodies that are in the way.
-        first: How far the robot was when the order came.
+        first: The state of the robot when the order came.
     """
 
     velocity: Velocity
@@ -108,14 +108,14 @@ class Steering:
     _progress: dict[int, Progress] = field(default_factory=dict, init=False)  # by time [us]
 
     def decide(self, now: Situation) -> Plan | None:
-        """Return the way of the whole time; None once that is over."""
+        """Return the plan for the whole time; None once that is over."""
         if self._progress:
             return None
         plan = now.plan()
         return plan.follow(self._way(now.actor, plan))
 
     def progress_at(self, time_us: int) -> Progress:
-        """Return how far a robot is at a moment; as one that stands, if the time is over."""
+        """Return the state of a robot at a moment; at rest if the time is over."""
         passed = [end_us for end_us in self._progress if end_us <= time_us]
         if not passed or time_us > max(self._progress):
             return AT_REST
@@ -161,7 +161,7 @@ class Steering:
     def _move(
         self, body: Body, start: tuple[int, int], goal: tuple[int, int], units: float
     ) -> tuple[tuple[int, int], bool]:
-        """Return how far the body gets, and whether nothing was in its way."""
+        """Return the point that the body reaches, and whether nothing was in its way."""
         x, y = start
         dx = goal[0] - x
         dy = goal[1] - y
@@ -178,7 +178,7 @@ class Steering:
 
 
 def _rounded(value: int) -> int:
-    """Return what a number in 1/FINE rounds to."""
+    """Return a number in 1/FINE, rounded to an integer."""
     return (value + FINE // 2) // FINE
 
 
@@ -188,14 +188,14 @@ def _length(x: float, y: float) -> float:
 
 
 def _gained(body: Body, time_us: int) -> float:
-    """Return by how much the speed of a robot can change in a time [m/s]."""
+    """Return the largest change of a robot's speed in a time [m/s]."""
     if not isinstance(body.drive, Trapezoidal):
         return math.inf
     return body.drive.acceleration * time_us / 1e6
 
 
 def _turned(velocity: Velocity, scale: float, heading: int) -> tuple[int, int]:
-    """Return a way of so many lattice units for each m/s, in the frame of the home [1/FINE]."""
+    """Return a way of `scale` lattice units for each m/s, in the frame of the home [1/FINE]."""
     ahead = round(velocity.forward * scale * FINE)
     across = round(velocity.left * scale * FINE)
     x = ahead * cosine(heading) - across * sine(heading)

@@ -1,4 +1,4 @@
-"""What the core is told of a body that gives way, and what it answers: see `Timelines.way_past`."""
+"""Arguments and results of the core for a body that gives way: see `Timelines.way_past`."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,15 +7,15 @@ from fleet2d.kernels import I16, I32, I64, Legs, Mesh, Routes
 
 
 class Yielder(NamedTuple):
-    """A body that gives way, and how it goes somewhere.
+    """A body that gives way, and its motion.
 
     Attributes:
-        row: Its number.
-        space: Where its middle may be.
-        routes: The shortest ways in it; None if it takes others.
-        speed: How fast it goes [lattice units per second].
-        turn_rate: How fast it turns [1/4096 turn per second].
-        beat_us: If it is late, it leaves a stop at a multiple of that [us].
+        row: The number of the body.
+        space: The space in which its middle may be.
+        routes: The shortest routes in the space; None if the body takes others.
+        speed: Its speed [lattice units per second].
+        turn_rate: Its turn rate [1/4096 turn per second].
+        beat_us: A late body leaves a stop at a multiple of this time [us].
         walk: Called with time [us], x, y, heading, the x and y of a goal to which no route leads,
             and the discs to keep clear of, as for `Routes.around`; returns the breakpoints of a way
             there, int64 (n, 5), or None.
@@ -31,12 +31,12 @@ class Yielder(NamedTuple):
 
 
 class BodyInWay(NamedTuple):
-    """A body in the way of another one, and where that one may pass it.
+    """A body in the way of another one, and the space to pass it.
 
     Attributes:
         other: The body in the way.
-        near: How near to a stop of the other one it must stand to take it [lattice].
-        distance: At which distance the other one passes it [lattice].
+        near: Distance from a stop of the other one below which the body takes it [lattice].
+        distance: Distance at which the other one passes [lattice].
         room_of_place: int16 (rows, columns), the room of each cell, -1 for none.
         parts: int32 (triangles,), the part of each triangle of the space of the other one, or a
             function that returns the part of a point.
@@ -52,17 +52,17 @@ class BodyInWay(NamedTuple):
 
 
 class AsideSearch(NamedTuple):
-    """Where a body looks for places to step aside to.
+    """The search of a body for a place to step aside to.
 
     Attributes:
         part_of_cell: int32 (rows, columns), the part of its space of each cell.
-        part: Its part.
+        part: The part of the body.
         begin: Returns the point from which it goes there [lattice].
-        near_cells: How many cells to each side it looks first.
-        far_cells: And then.
-        spacing: It looks at every so many of them.
-        most: For how many places it looks.
-        reach: int64 (bodies,), how near the others may come to a place [lattice].
+        near_cells: Cells to each side that are searched first.
+        far_cells: Cells to each side that are searched then.
+        spacing: Distance between tried cells [cells].
+        most: The maximum number of places.
+        reach: int64 (bodies,), least distance of each other body from a place [lattice].
     """
 
     part_of_cell: I32
@@ -76,13 +76,13 @@ class AsideSearch(NamedTuple):
 
 
 class Delay(NamedTuple):
-    """By how much later a part of a track comes.
+    """The delay of a part of a track.
 
     Attributes:
-        after_us: What was planned up to that moment has happened, or has the delay before.
-        since_us: What was planned before that moment happens at it.
-        later_us: How much later all is, up to the edge.
-        edge_us: A rest that begins then is shortened, so that the body is on time again after it.
+        after_us: The moment up to which plans have happened, or have the delay before.
+        since_us: The moment at which earlier plans happen.
+        later_us: The delay, up to the edge.
+        edge_us: The beginning of a rest that is shortened, so that the body is on time afterwards.
     """
 
     after_us: int
@@ -91,7 +91,7 @@ class Delay(NamedTuple):
     edge_us: int
 
     def of(self, time_us: int) -> int:
-        """Return when something happens that was planned for a moment."""
+        """Return the time at which something planned for a moment happens."""
         time_us = max(time_us, self.since_us)
         if time_us <= self.edge_us:
             return time_us + self.later_us

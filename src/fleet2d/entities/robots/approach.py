@@ -1,4 +1,4 @@
-"""What behaviors toward people share: where a person likely is, where to look, how near to come."""
+"""Shared parts of behaviors toward people: likely rooms, viewpoints, and approaches."""
 
 import math
 from collections.abc import Sequence
@@ -50,15 +50,15 @@ class BeliefBehavior(Behavior):
     source: str | None = None
 
     def about(self) -> tuple[str, ...]:
-        """Return the user that it depends on, if it is one by name."""
+        """Return the user that the behavior depends on, if given by name."""
         return () if self.user == ANYONE else (self.user,)
 
     def reads(self) -> tuple[str, ...]:
-        """Return the algorithm that it reads."""
+        """Return the algorithm to read."""
         return () if self.source is None else (self.source,)
 
     def output(self, now: Situation) -> Any:
-        """Return the output that it reads, evaluated at the present time; None before the first."""
+        """Return the output of the source, evaluated at the present time; None before the first."""
         output: Any = now.outputs.get(self.source) if self.source else None
         varies = callable(getattr(output, "at", None))
         return output.at(now.time) if varies else output
@@ -91,7 +91,7 @@ class BeliefBehavior(Behavior):
         return RoomBelief(np.asarray(share, np.float64), float(away))
 
 
-# Maximum number of cells of a room tried as viewpoints, and as targets to be seen, evenly spread.
+# At most this many cells of a room are tried as viewpoints, and as targets to be seen.
 MAX_VIEWPOINT_CELLS = 48
 MAX_TARGET_CELLS = 400
 
@@ -100,8 +100,8 @@ class Viewpoints(NamedTuple):
     """Points to look round from in a room.
 
     Attributes:
-        points: Lattice points, the one that shows most first.
-        share: The part of the room that they show together.
+        points: Lattice points, first the one with the largest view.
+        share: The part of the room in view from all of them together.
     """
 
     points: tuple[LatticePoint, ...]
@@ -109,7 +109,7 @@ class Viewpoints(NamedTuple):
 
 
 def sight_range(actor: Actor) -> float:
-    """Return how far the cameras of a body see [lattice]; 0 without a camera."""
+    """Return the range of the cameras of a body [lattice]; 0 without a camera."""
     ranges = [camera.range[1] for camera in actor.entity.eyes.values()]
     return max(ranges, default=0.0) * actor.home.lattice.units_per_m
 
@@ -160,7 +160,7 @@ MOST_STOPS = 4
 
 
 def places_to_see(actor: Actor, room: Room) -> tuple[list[str], I64]:
-    """Return where people usually are in a room: at its furniture, else anywhere.
+    """Return the usual places of people in a room: at its furniture, else anywhere.
 
     Returns:
         The names of the furniture, of each point; and the points [lattice], int64 (n, 2). In a
@@ -192,7 +192,7 @@ def stops_with_view(actor: Actor, room: Room) -> tuple[LatticePoint, ...]:
 
 
 def unwatched(actor: Actor, stops: Sequence[LatticePoint]) -> list[str]:
-    """Return what is never in view of a body that looks round at some stops, by room.
+    """Describe the places that are never in view from some stops, by room.
 
     A line has the room, and its furniture that is out of view; or, of a room without furniture,
     the share of the floor, if it is more than half.
@@ -271,7 +271,7 @@ DIRECTIONS = 32
 
 
 def way_seconds(actor: Actor, start: LatticePoint, goal: LatticePoint) -> float | None:
-    """Return how long a robot drives between two lattice points; None: no way.
+    """Return the driving time of a robot between two lattice points [s]; None: no way.
 
     The usual drive, `differential`, leaves out its turns; others begin in the direction of the way.
     """
@@ -292,7 +292,7 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         now: The situation.
         x: Where the person is [m].
         y: Likewise.
-        distance: How near it comes, in a straight line [m].
+        distance: Distance to keep, in a straight line [m].
 
     Returns:
         A point on the shortest way to the free place nearest to the person; the robot's position,
@@ -309,7 +309,7 @@ def spot_near(now: Situation, x: float, y: float, distance: float) -> LatticePoi
         return position
     for start, end in pairwise(route.tolist()):
         length = _distance(start, end)
-        if _distance(person, start) - length > reach + 2:  # rounded points are a little off the leg
+        if _distance(person, start) - length > reach + 2:  # rounded points lie a little off the leg
             continue
         steps = max(1, int(length / (lattice.units_per_m / 20)))
         leg = np.subtract(end, start)
@@ -376,7 +376,7 @@ def check_has_camera(actor: Actor, behavior: str) -> None:
 
 def _legs(route: I64) -> list[float]:
     """Return the lengths of the legs of a route [lattice]."""
-    # A route has few legs: numbers of Python are faster than arrays here.
+    # A route has few legs, for which numbers of Python are faster than arrays.
     return [_distance(start, end) for start, end in pairwise(route.tolist())]
 
 

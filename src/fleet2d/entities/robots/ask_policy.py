@@ -1,4 +1,4 @@
-"""Ask policy: a robot that learns whom to ask what, and when, from what it sees and is answered.
+"""Ask policy: a robot that learns from sightings and answers whom to ask what, and when.
 
 An observation has a row for each of the robot's interactions, in the order of the scenario. Nothing
 in it is the truth: it is computed from the robot's queue, clock and sightings, and from the answers
@@ -35,15 +35,15 @@ from fleet2d.runtime.events import EventKind
 DOES: tuple[str, ...] = get_args(InteractionKind)
 
 ASK_COLUMNS = (
-    # Of the interaction and its open request
+    # The interaction and its open request
     *("interaction", "open", "worth", "value", "time_left", "tries"),
     *(f"do_{kind}" for kind in DOES),
-    # Of its person, as the robot saw her
+    # Its person, as the robot has seen them
     *("in_view", "seen_30min", "seen_6h", "seen_now"),
     *(f"in_{kind}" for kind in KINDS),
-    # Of the answers so far
+    # The answers so far
     *("asked_1h", "asked_1d", "yes", "yes_now", "time_now"),
-    # The same in all rows
+    # Values that are the same in all rows
     *("hour_sin", "hour_cos", "weekend", "weeks"),
 )
 """The columns of an observation, in their order: see docs/how-to/gym.md."""
@@ -53,9 +53,9 @@ _AT = {name: number for number, name in enumerate(ASK_COLUMNS)}
 HALF_WORTH = 2.0
 # After this time the column `weeks` is a half.
 WEEKS_S = 28 * DAY_S
-# How long it stands after a round that found nobody.
+# Time of standing after a round that found nobody.
 MOMENT = timedelta(seconds=1)
-# The answers of a person who had time.
+# Only a person who had time gives these answers.
 HAD_TIME = frozenset({Outcome.ACCEPTED, Outcome.DECLINED})
 # Imagined answers in each rate, half of them yes.
 PRIOR = 2.0
@@ -66,15 +66,15 @@ Stage = Literal["react", "reply", "address", "go_on", "end_round", "choose", "le
 class AskPolicy(LearnedBehavior, Interact):
     """Let a learned policy choose which request to serve next, or to wait.
 
-    It approaches, addresses and looks for people as `interact` does. Whenever a request comes up,
-    the robot is done with one, or `period` after it chose to wait, the policy chooses: action i is
-    to serve the open request of interaction i, looking for its person if necessary; the last action
-    is to wait. Impossible is what isn't open, has to rest until later, or is about a person who has
-    to be left alone. While it waits, later behaviors decide.
+    The robot approaches, addresses and looks for people as `interact` does. The policy chooses
+    whenever a request comes up, the robot is done with one, or `period` after it chose to wait:
+    action i is to serve the open request of interaction i, looking for its person if necessary; the
+    last action is to wait. Requests that aren't open, have to rest, or are about a person to be
+    left alone can't be chosen. While the robot waits, later behaviors decide.
 
     Attributes:
         requests: Number of interactions in an observation; a scenario may have fewer.
-        period: How long it waits, unless a request comes up.
+        period: Time of waiting, unless a request comes up.
     """
 
     columns = ASK_COLUMNS
@@ -102,13 +102,13 @@ class AskPolicy(LearnedBehavior, Interact):
         self.had_time = np.zeros((self.requests, HOURS))
         self.asked_at = np.full(self.requests, -np.inf)  # [s since the start]
 
-    # What it knows
+    # Observations
 
     def names(self, now: Situation) -> list[str]:
-        """Return the names of its interactions, in the order of the rows.
+        """Return the names of the robot's interactions, in the order of the rows.
 
         Raises:
-            PlacementError: It has more of them than an observation has rows.
+            PlacementError: The robot has more interactions than an observation has rows.
         """
         names = [] if now.requests is None else list(now.requests.interactions)
         if len(names) > self.requests:
@@ -132,7 +132,7 @@ class AskPolicy(LearnedBehavior, Interact):
         to = request.to
         is_asked = self.served is not None and self.served.request.to == to
         if is_asked and self._is_broken_off(now):
-            return False  # it was sent away while it asked
+            return False  # the robot was sent away while it asked
         place = now.in_view.get(to)
         if place is not None:
             return not self._leaves_alone(now, request, place)
@@ -187,7 +187,7 @@ class AskPolicy(LearnedBehavior, Interact):
         return table
 
     def _sightings(self, now: Situation, person: str) -> dict[str, float]:
-        """Return the columns of when and where a person was seen."""
+        """Return the columns on when and where a person was seen."""
         memory = now.actor.recall().rooms
         of = list(now.actor.people).index(person)
         last: int = int(memory.last[of].max())
@@ -205,7 +205,7 @@ class AskPolicy(LearnedBehavior, Interact):
         }
 
     def _answers(self, now: Situation, row: int, person: str) -> dict[str, float]:
-        """Return the columns of how a person has answered, to an interaction and to all."""
+        """Return the columns on a person's answers, to an interaction and to all."""
         assert now.requests is not None
         wanted = now.requests.interactions.values()
         same = [number for number, each in enumerate(wanted) if each.to == person]
@@ -220,19 +220,19 @@ class AskPolicy(LearnedBehavior, Interact):
             "time_now": _rate(self.had_time[same][:, hours], self.asked[same][:, hours]),
         }
 
-    # What it does
+    # Decisions
 
     def asks(self, now: Situation) -> bool:
-        """Return whether its decision at a step depends on the policy."""
+        """Return whether the decision at a step depends on the policy."""
         return self._stage(now) == "choose"
 
     def _is_broken_off(self, now: Situation) -> bool:
-        """Return whether an order or another behavior has ended its question to a person."""
+        """Return whether an order or another behavior has broken off the question to a person."""
         is_asking = self.served is not None and self.served.step == "ask"
         return is_asking and now.actor.plan.root is not self.plan
 
     def _stage(self, now: Situation) -> Stage:
-        """Return what it has to do at a step; nothing changes by it."""
+        """Return the stage of the behavior at a step; nothing changes."""
         served = self.served if now.actor.plan.root is self.plan else None
         if served is not None and served.step == "ask":
             return "react"
@@ -249,12 +249,12 @@ class AskPolicy(LearnedBehavior, Interact):
         return "leave" if waits or not self.options(now) else "choose"
 
     def _rest_of_round(self, now: Situation) -> Plan | None:
-        """Return the rest of the round that it is on; None: it is over."""
+        """Return the rest of the present round; None: it is over."""
         last = now.actor.plan
         return None if last.is_over(now.step) else resumed(now.plan(), last, now.step)
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when the policy may choose again."""
+        """Return the time at which the policy may choose again."""
         times = [super().wakes_at(now, plan)]
         if now.time < self.waits_until and now.requests is not None and now.requests.open:
             times.append(self.waits_until)
@@ -265,11 +265,11 @@ class AskPolicy(LearnedBehavior, Interact):
         served = self.served
         plan = self._next_plan(now)
         if served is not None and served.step == "ask":
-            self._remember_answer(now, served)  # not before, as observations are made before, too
+            self._remember_answer(now, served)  # observations are made before this
         return plan
 
     def _next_plan(self, now: Situation) -> Plan | None:
-        """Return what to do at a step; None: later behaviors decide."""
+        """Return the plan at a step; None: later behaviors decide."""
         stage = self._stage(now)
         served = self._take_served(now)
         if stage == "reply":
@@ -306,11 +306,11 @@ class AskPolicy(LearnedBehavior, Interact):
     def _address_in_view(self, now: Situation, request: Request) -> Plan:
         """Address the person of a request, who is in view."""
         place = now.in_view[request.to]
-        self._may_address(now, request, place)  # what kept it from that is over
+        self._may_address(now, request, place)  # the robot may address the person again
         return self._ask(now, request, place)
 
     def _remember_answer(self, now: Situation, served: ServedRequest) -> None:
-        """Count the answer to a question; none, if it was sent away, too."""
+        """Count the answer to a question; being sent away counts as no answer."""
         row = self.names(now).index(served.request.name)
         answers = answers_to(now, served.text)
         hour = now.time.hour

@@ -11,7 +11,7 @@ from fleet2d.errors import ScenarioError
 from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.runtime.events import EventKind
 
-# How long it rests at the charger before all behaviors are asked again.
+# Time of rest at the charger before all behaviors are asked again.
 REST = timedelta(hours=1)
 
 
@@ -51,7 +51,7 @@ class Dock(Behavior):
         """Check that there is a battery.
 
         Raises:
-            ScenarioError: There is none, or the charger is in a room to avoid.
+            ScenarioError: There is no battery, or the charger is in a room to avoid.
         """
         if actor.charge is None:
             raise ScenarioError(
@@ -67,18 +67,18 @@ class Dock(Behavior):
             )
 
     def busy(self) -> bool:
-        """Return whether it is charging."""
+        """Return whether the robot is charging."""
         return self.charging
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when the plan brings the charge down to the threshold."""
+        """Return the time at which the plan brings the charge down to the threshold."""
         charge = now.actor.charge
         assert charge is not None
         falls = charge.falls_to(self.threshold, plan.finish())
         return None if falls is None else now.actor.clock.start + timedelta(microseconds=falls)
 
     def leaves_turns(self) -> bool:
-        """Return whether behaviors after it may be asked: not if it rests instead."""
+        """Return whether later behaviors may be asked; not if the robot rests instead."""
         return not self.rest or bool(self.when or self.cooldown)
 
     def decide(self, now: Situation) -> Plan | None:
@@ -98,7 +98,7 @@ class Dock(Behavior):
             self.charging = False
             plan.note(EventKind.CHARGED, charge.percent)
             if not self.rest:
-                # The row needs a plan; the shortest one, so that later behaviors are asked next.
+                # The note needs a plan: the shortest one, so that later behaviors are asked next.
                 return plan.stay(timedelta(microseconds=1))
         if self.rest:
             if plan.position != charger:

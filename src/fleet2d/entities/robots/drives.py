@@ -17,7 +17,7 @@ class Holonomic(Drive):
     """Drives in any direction at constant speed, without stopping to turn.
 
     Attributes:
-        turns: Whether it turns towards its way while it drives; else it keeps its heading.
+        turns: Whether the robot turns into the direction of motion; else it keeps its heading.
     """
 
     turns: bool = True
@@ -49,7 +49,7 @@ class Trapezoidal(Differential):
     and a plan begins at rest, also where another one was interrupted.
 
     Attributes:
-        acceleration: How fast it gathers speed and brakes [m/s²].
+        acceleration: Acceleration and deceleration [m/s²].
         pieces: Number of constant speeds that approximate acceleration, and braking.
     """
 
@@ -58,7 +58,7 @@ class Trapezoidal(Differential):
 
     def straight(self, length: float, speed: float) -> Iterator[tuple[float, float]]:
         """Yield times [s] and distances [m] at which the speed changes on a leg, and its end."""
-        ramp = min(speed * speed / self.acceleration, length) / 2  # until it is at full speed [m]
+        ramp = min(speed * speed / self.acceleration, length) / 2  # distance to full speed [m]
         rising = sqrt(2 * ramp / self.acceleration)
         full = self.acceleration * rising
         pieces = max(1, min(self.pieces, isqrt(int(ramp * 1000 / SHORTEST_MM))))
@@ -72,6 +72,6 @@ class Trapezoidal(Differential):
 
     def seconds(self, metres: F64, speed: float) -> F64:
         """Return the robot's estimates of the time to many places, each way as one leg [s]."""
-        changing = speed * speed / self.acceleration  # gathering speed and braking [m]
+        changing = speed * speed / self.acceleration  # distance of acceleration and braking [m]
         at_speed = np.maximum(metres - changing, 0.0) / speed
         return 2 * np.sqrt(np.minimum(metres, changing) / self.acceleration) + at_speed

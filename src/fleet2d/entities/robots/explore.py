@@ -13,12 +13,12 @@ from fleet2d.entities.robots.approach import centres, check_has_camera, spread, 
 from fleet2d.kernels import TURN, Bool, squared_distance
 from fleet2d.runtime.events import EventKind
 
-# Maximum number of cells of the home that are tried as viewpoints, and as targets to be seen.
+# At most this many cells of the home are tried as viewpoints, and as targets to be seen.
 MAX_VIEWPOINT_CELLS = 800
 MAX_TARGET_CELLS = 2000
 # The smallest part of the floor that a look has to show.
 WORTH = 0.002
-# Time after which it tries again to pass a shut door to floor that isn't seen yet.
+# After this time, the robot tries again to pass a shut door to unseen floor.
 RETRY_INTERVAL = timedelta(minutes=1)
 
 
@@ -29,15 +29,16 @@ class Explore(Behavior):
     `reach` of a frontier, the robot drives to the one that shows most unseen floor per second of
     the way and a turn (González-Baños and Latombe 2002). There it turns once, and decides again.
     Walls and tall furniture count as they are at present. It has finished when `enough` of the
-    floor is seen of all rooms that it could enter when the run began, or when no look shows enough
-    new floor; from then on, later behaviors decide. If a shut door is in its way, they decide until
-    the door is open. Events: `explores`, with the share seen, and `explored` at the end.
+    floor is seen of all rooms that it could enter at the beginning of the run, or when no look
+    shows enough new floor; from then on, later behaviors decide. If a shut door is in the way, they
+    decide until the door is open. Events: `explores`, with the share seen, and `explored` at the
+    end.
 
     Attributes:
         enough: Share of the floor to be seen.
-        reach: How near it goes to a frontier [m].
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't explore: it
-            looks round in none of them, and their floor needn't be seen.
+        reach: Distance from a frontier to go to [m].
+        no_stops_in: Rooms, or kinds of rooms if the home has them, to leave unexplored: it looks
+            round in none of them, and their floor needn't be seen.
     """
 
     records = frozenset({EventKind.EXPLORED, EventKind.EXPLORES})
@@ -62,17 +63,17 @@ class Explore(Behavior):
         self.targets = spread(np.argwhere(self.floor), MAX_TARGET_CELLS)
         self.tried: Bool = np.zeros(len(self.targets), np.bool_)  # looked at, seen or not
         self.visible: tuple[int, dict[int, Bool]] = actor.home.version, {}  # targets, by stand
-        self.stand: int | None = None  # the index of the place that it is going to
-        self.blocked_stands: set[int] = set()  # places that a person in the way kept it from
-        self.plan: Plan | None = None  # the last one that it returned
+        self.stand: int | None = None  # index of the present destination
+        self.blocked_stands: set[int] = set()  # places blocked by a person
+        self.plan: Plan | None = None  # the last plan returned
         self.has_looked = self.is_done = self.is_shut_out = False
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when it tries again to pass a shut door."""
+        """Return the time of the next try to pass a shut door."""
         return now.time + RETRY_INTERVAL if self.is_shut_out else None
 
     def give_up(self, now: Situation) -> None:
-        """Leave out the place that it was going to."""
+        """Leave out the present destination."""
         if self.stand is not None:
             self.blocked_stands.add(self.stand)
 
@@ -125,7 +126,7 @@ class Explore(Behavior):
 
     def _near_frontier(self, now: Situation, explored: Bool) -> Bool:
         """Return which places are within reach of a frontier, bool (places,)."""
-        is_beside = squared_distance(~(explored & self.floor)) <= 2  # across a side or a corner
+        is_beside = squared_distance(~(explored & self.floor)) <= 2  # sides and corners
         frontier = self.floor & ~explored & is_beside
         away = squared_distance(~frontier)
         cells = self.reach / now.home.lattice.cell

@@ -43,7 +43,7 @@ from fleet2d.runtime.local_time import at_reading
 SHARE_TO_SHOW = 0.9
 # Weight of a prior proportional to the areas of rooms, beside that of the source.
 DOUBT = 0.1
-# Counted for a route that is blocked at present, as by a shut door [s].
+# A route that is blocked at present, as by a shut door, counts as this long [s].
 BLOCKED_ROUTE_S = 86_400.0
 
 
@@ -69,7 +69,7 @@ class Sites:
         self.share = np.array([of_room.share for of_room in viewpoints], np.float64)
         self._points = [of_room.points for of_room in viewpoints]
         self._actor = actor
-        self._times: tuple[int, F64, F64] | None = None  # version of the home, travel, look
+        self._times: tuple[int, F64, F64] | None = None  # home's version; travel and look times
 
     def __len__(self) -> int:
         """Return the number of sites."""
@@ -124,12 +124,12 @@ class SearchState:
     """A search in progress.
 
     Attributes:
-        since: When it began.
+        since: The time of its beginning.
         user: The person to find, or ANYONE.
-        looked_at: When the last look at each site ended that did not find the person, by number.
+        looked_at: The end of the last empty look at each site, by number.
         route: The sites to go to next, by number.
-        goal: The site that it is going to; None: none.
-        blocked: Sites that a person in the way kept it from.
+        goal: The present destination; None: none.
+        blocked: Sites blocked by a person.
     """
 
     since: datetime
@@ -143,9 +143,9 @@ class SearchState:
 class Find(BeliefBehavior):
     """Look for a person at given times or on command, until found, given up or believed out.
 
-    A site is a room, with enough viewpoints that little of it stays out of view. The `policy`
-    chooses the order of the sites by the probabilities of `source` for the present time, and by
-    travel times: see :mod:`fleet2d.entities.robots.search`. `receding` decides again after
+    A site is a room, with enough viewpoints that little of its floor stays out of view. The
+    `policy` chooses the order of the sites by the probabilities of `source` for the present time,
+    and by travel times: see :mod:`fleet2d.entities.robots.search`. `receding` decides again after
     every empty look, by the remaining probabilities; the others decide once, when the search
     begins.
 
@@ -155,8 +155,8 @@ class Find(BeliefBehavior):
     person's name: `find_begins`, and one of `found`, `not_at_home` and `gave_up`.
 
     Attributes:
-        policy: In which order it looks at the rooms.
-        at: Times of day at which it begins; without them and `every`: when it is called.
+        policy: The order of looking into the rooms.
+        at: Times of day at which a search begins; without them and `every`: on command only.
         every: Interval between two searches, from the start on, instead of `at`.
         late: A search that can't begin within this time is left out.
         deadline: Duration of a search after which it gives up.
@@ -164,11 +164,10 @@ class Find(BeliefBehavior):
             has looked into every room that it can get to.
         out: Probability that the person is out, as long as the source has no output.
         memory: Age at which an empty look counts half, because people move.
-        views: The maximum number of places in a room from which it looks around.
-        distance: How far it stays from the person it found [m].
-        stay: How long it stays with the person it found.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it looks into from
-            outside only.
+        views: The maximum number of viewpoints in a room.
+        distance: Distance to keep from the found person [m].
+        stay: Time to stay with the found person.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, to look into from outside only.
     """
 
     records = frozenset(
@@ -195,7 +194,7 @@ class Find(BeliefBehavior):
             raise problem("it begins by 'at' (times of day) or 'every' (a duration), not by both")
 
     def takes(self, command: Command) -> bool:
-        """Return whether it looks for the person of a command."""
+        """Return whether a command asks for a search."""
         return super().takes(command) and self.user in (ANYONE, command.target)
 
     def start(self, actor: Actor) -> None:
@@ -216,15 +215,15 @@ class Find(BeliefBehavior):
         )
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when the next search begins."""
+        """Return the beginning of the next search."""
         return self.due
 
     def busy(self) -> bool:
-        """Return whether it searches."""
+        """Return whether a search is in progress."""
         return self.search is not None
 
     def give_up(self, now: Situation) -> None:
-        """Leave out the site that it was going to, for this search."""
+        """Leave out the present destination for this search."""
         search = self.search
         if search is not None and search.goal is not None:
             search.blocked.add(search.goal)
@@ -325,7 +324,7 @@ class Find(BeliefBehavior):
         search.goal = route[0] if route else None
         if route:
             self.sites.look_round(plan, route[0]).interrupt_on(EventKind.USER_SEEN)
-        else:  # shut doors block all sites
+        else:  # shut doors block all remaining sites
             plan.stay(DOOR_WAIT)
         self.plan = plan.ask_by(ends)
         return plan
@@ -355,7 +354,7 @@ class Find(BeliefBehavior):
         return plan.note(event, user)
 
     def _next(self, after: datetime, start: datetime) -> datetime | None:
-        """Return when the next search is due after a moment; None: only on command."""
+        """Return the time of the next search after a moment; None: only on command."""
         if self.every is not None:
             return start + ((after - start) // self.every + 1) * self.every
         if not self.at:

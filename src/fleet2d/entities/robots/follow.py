@@ -13,31 +13,30 @@ from fleet2d.entities.robots.approach import approach, centres, check_has_camera
 from fleet2d.floorplan.lattice import LatticePoint
 from fleet2d.runtime.events import EventKind
 
-# Distance from where a person was lost at which it looks for the person [m].
+# The robot looks for a lost person from this distance of the last position [m].
 SEARCH_DISTANCE_M = 0.3
-# A person who moves no farther than this between two looks rests: the interval doubles [m].
+# A person who moves no farther than this between two looks rests, and the interval doubles [m].
 STILL_M = 0.3
 MAX_INTERVAL = timedelta(seconds=32)
 
-# How far from a room that it doesn't enter it waits, so that others can pass the door [m].
+# Outside of a forbidden room, it waits this far off, so that others can pass the door [m].
 OFF_DOOR_M = 0.8
 
 
 class Follow(Behavior):
     """Follow a person at a distance for as long as the cameras have the person in view.
 
-    Every `update` it looks where the person is, and drives there by the shortest path; while the
-    person rests, the interval doubles each time, up to 32 s. It looks for a person whom it lost
-    where the person was perceived last: it drives there and turns once. After that, later behaviors
-    decide until the person comes into view again. Events: `follows`, `lost`, with the person's
-    name.
+    Every `update` the robot looks where the person is, and drives there by the shortest path; while
+    the person rests, the interval doubles each time, up to 32 s. It looks for a lost person where
+    it perceived them last: it drives there and turns once. After that, later behaviors decide until
+    the person comes into view again. Events: `follows`, `lost`, with the person's name.
 
     Attributes:
-        user: User that it follows; left out: the first in view.
-        distance: How far behind it stays [m].
-        update: How often it looks where the person is.
-        longest: For how long it follows at most; 0: without end.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, into which it follows nobody.
+        user: The user to follow; left out: the first in view.
+        distance: Distance to the person [m].
+        update: Time between two looks at the person.
+        longest: The longest time to follow; 0: without end.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, into which to follow nobody.
     """
 
     records = frozenset({EventKind.FOLLOWS, EventKind.LOST})
@@ -50,25 +49,25 @@ class Follow(Behavior):
     no_stops_in: tuple[str, ...] = ()
 
     def about(self) -> tuple[str, ...]:
-        """Return the user that it follows, if it is one by name."""
+        """Return the user to follow, if given by name."""
         return (self.user,) if self.user else ()
 
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "follow")
         self.avoided = avoided_rooms(actor, "follow.no_stops_in", self.no_stops_in)
-        self.person: str | None = None  # the one that it follows now
-        self.last = (0.0, 0.0)  # where the person was perceived last [m]
+        self.person: str | None = None  # the person followed now
+        self.last = (0.0, 0.0)  # last perceived position of the person [m]
         self.pause = self.update
         self.since = actor.clock.start
         self.is_searching = False
 
     def busy(self) -> bool:
-        """Return whether it follows or looks for a person."""
+        """Return whether the robot follows or looks for a person."""
         return self.person is not None
 
     def dismiss(self) -> None:
-        """Let the person go; it follows again when somebody comes into view."""
+        """Let the person go, and follow again when somebody comes into view."""
         self.person = None
         self.is_searching = False
 
@@ -87,7 +86,7 @@ class Follow(Behavior):
             return None
         if self.person in in_view:
             return self._follow(now, now.plan())
-        if self.is_searching:  # it has looked round where the person was last, without success
+        if self.is_searching:  # a look round at the last position had no success
             self.person = None
             self.is_searching = False
             return None
@@ -111,21 +110,21 @@ class Follow(Behavior):
         until = now.time + self.pause
         if self.longest:
             until = min(until, self.since + self.longest)
-        # It looks again before the end of a long way, as the person may walk on.
+        # On a long way, it looks again before the end, as the person may walk on.
         return plan.interrupt_on(EventKind.USER_LOST).stay(until=until).ask_by(until)
 
 
 class Come(Behavior):
-    """Go where the robot is called to, and wait there for a while.
+    """Go to the place of a call, and wait there for a while.
 
-    It only acts on an intervention `call` with a place. In a room it stops at the point farthest
-    from the walls. If a shut door is in the way, it waits and tries again. Event: `visits`, with
-    the place.
+    This behavior only acts on an intervention `call` with a place. In a room the robot stops at the
+    point farthest from the walls. If a shut door is in the way, it waits and tries again. Event:
+    `visits`, with the place.
 
     Attributes:
-        stay: How long it waits there.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't enter: called
-            into one of them, it waits outside, near the door.
+        stay: Time of waiting there.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, not to enter: called into one of
+            them, it waits outside, near the door.
     """
 
     records = frozenset({EventKind.VISITS})
@@ -141,15 +140,15 @@ class Come(Behavior):
         self.command: Command | None = None
 
     def busy(self) -> bool:
-        """Return whether it is on its way."""
+        """Return whether the robot is on its way."""
         return self.command is not None
 
     def dismiss(self) -> None:
-        """Stay away from where it was called to."""
+        """Give up the call."""
         self.command = None
 
     def decide(self, now: Situation) -> Plan | None:
-        """Go where it is called to, if it is."""
+        """Go to the place of a call, if there is one."""
         command = self.command = now.take_command("come") or self.command
         if command is None:
             return None
@@ -160,14 +159,14 @@ class Come(Behavior):
         return plan.stay(self.stay)
 
     def _outside(self, actor: Actor, goal: LatticePoint) -> LatticePoint:
-        """Return a goal, or where the robot waits for it if that is in a room it doesn't enter."""
+        """Return a goal, or the place to wait at if the goal is in a room not to enter."""
         if not lies_in(actor, goal, self.avoided):
             return goal
         space = actor.space_without(self.avoided)
         cells = centres(space.cells(None, space.part_near(*actor.state.position)))
         metres = actor.space.distances(goal, cells)
         if not np.isfinite(metres).any():
-            return goal  # behind a shut door: there is no way at present
+            return goal  # a shut door leaves no way at present
         off_m = np.abs(metres - metres.min() - OFF_DOOR_M)
         x, y = cells[off_m.argmin()].tolist()
         return x, y

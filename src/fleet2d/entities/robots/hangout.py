@@ -23,7 +23,7 @@ from fleet2d.runtime.events import EventKind
 
 # Radius of the bodies whose ways count as the ways of people [m].
 PERSON = 0.2
-# Personal space ends at 1.2 m (Hall): within it, a place is the worse the nearer to a seat [m].
+# Personal space ends at 1.2 m (Hall); within it, places get worse toward a seat [m].
 PERSONAL = 1.2
 # Maximum number of cells of a room that count as seats, if it has no furniture to sit or lie on.
 MAX_SEATS = 60
@@ -42,7 +42,7 @@ class HangoutPlaces:
         room: Index of each place's room, int64 (n,).
         block: Share of the ways between any two rooms that lead through the robot's body there,
             float64 (n,).
-        prox: How deep it is in personal space, from 1 on a seat to 0 outside, float64 (n,).
+        prox: Depth within personal space, from 1 on a seat to 0 outside, float64 (n,).
     """
 
     def __init__(self, actor: Actor, avoid: frozenset[int]) -> None:
@@ -55,7 +55,8 @@ class HangoutPlaces:
         self._actor = actor
         home = actor.home
         people = home.space(PERSON, opens_doors=True)
-        # The key has all that the places depend on: robots of other runs in this home share them.
+        # Robots of other runs in this home share the places, so the key has all that they depend
+        # on.
         body = actor.space, actor.part, actor.entity.radius
         self._key = (*body, people, home.objects, avoid)
         self.points, self.room, seats, self.block, self.prox = home.cached(
@@ -83,7 +84,7 @@ class HangoutPlaces:
         actor = self._actor
         reach = actor.speed, type(actor.drive), repr(actor.drive)
         key = ("nearness", *self._key, by, tau, actor.home.walls, sight_range(actor), *reach)
-        # In column order: it is read room by room.
+        # The array is read room by room, hence in column order.
         return actor.home.cached(
             key, lambda: read_only(np.asfortranarray(self._compute_nearness(by, tau)))
         )
@@ -114,7 +115,7 @@ class HangoutPlaces:
         return np.ascontiguousarray(points), rooms
 
     def _lay_out_seats(self) -> Seats:
-        """Return where people usually are in each room [lattice]: at its furniture, else all over.
+        """Return the usual places of people in each room: at furniture, else all over [lattice].
 
         Each place at furniture is looked up once, not for every room.
         """
@@ -208,17 +209,17 @@ def decay(x: F64) -> F64:
     return np.where(np.isfinite(x), 1 / growth, 0.0)
 
 
-# How far from doorways it stands at least.
+# Least distance from doorways [m].
 OFF_DOORS_M = 0.8
 # Weight of being near a seat, in relation to that of blocking ways.
 SEAT_WEIGHT = 0.5
-# When exploring a room: the part of it to be shown, by at most this many viewpoints.
+# Exploring a room has to show this part of it, by at most so many viewpoints.
 SHARE_TO_SHOW = 0.95
 MAX_VIEWS = 4
 
 
 class Hangout(BeliefBehavior):
-    """Stand near where people likely are, out of their way.
+    """Stand near the likely places of people, out of their way.
 
     Every `period` it rates the places on a grid of 0.5 m by
 
@@ -227,8 +228,8 @@ class Hangout(BeliefBehavior):
     where p(room) is the probability that the user is at home and in that room, from `source`; b is
     the share of the shortest ways between two rooms that lead through the robot's body there, for a
     person of radius 0.2 m; s falls from 1 on the place where furniture is used to 0 at 1.2 m from
-    it; and m = t / (t + tau), with t the travel time from where it is [s]. It moves only to a place
-    that beats the present one by `hysteresis`, and never in quiet hours. With probability
+    it; and m = t / (t + tau), with t the travel time from its position [s]. It moves only to a
+    place that beats the present one by `hysteresis`, and never in quiet hours. With probability
     `explore` it goes to a room drawn with equal chances instead, looks round in it, and comes back,
     so that its observations don't depend only on its own beliefs.
 
@@ -237,14 +238,14 @@ class Hangout(BeliefBehavior):
     Events: `relocates`, with the room it goes to, and `explores`, with the room it looks round in.
 
     Attributes:
-        period: How often it decides where to stand.
+        period: Time between two decisions where to stand.
         near: The measure of nearness: the same room; a view of its seats; or travel time.
         tau: Travel time at which nearness by `path` has fallen to 1/e.
         moving: Weight of the travel time to a place.
-        hysteresis: By how much another place must be better for it to move.
-        explore: Share of decisions in which it explores any room instead.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it stays out of.
-        quiet: Hours in which it doesn't move.
+        hysteresis: The least advantage of another place for which it moves.
+        explore: Share of decisions to explore any room instead.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, to stay out of.
+        quiet: Hours without moves.
     """
 
     always_decides = True
@@ -260,7 +261,7 @@ class Hangout(BeliefBehavior):
     quiet: Hours = ()
 
     def start(self, actor: Actor) -> None:
-        """Lay out the places, and rate them by what doesn't depend on where people are."""
+        """Lay out the places, and rate them by the costs that don't depend on people."""
         self.avoided = avoided_rooms(actor, "hangout.no_stops_in", self.no_stops_in)
         self.places = HangoutPlaces(actor, self.avoided)
         if not len(self.places.points):
@@ -274,18 +275,18 @@ class Hangout(BeliefBehavior):
         reachable = (room.index for room in actor.reachable_rooms())
         self.explored = [room for room in reachable if room not in self.avoided]
         self.rated_output: object = None  # the output behind `worth`; None before the first
-        self.rated_by = b""  # the probabilities behind it
+        self.rated_by = b""  # the probabilities behind `worth`
         self.worth = -self.penalty
         self.best = -np.inf  # the largest of `worth`
         self.place: int | None = None
         self.decides_at = actor.clock.start
-        self.is_blocked = False  # a person is on its place, or in front of it
+        self.is_blocked = False  # a person is on its place, or in the way
 
     def decide(self, now: Situation) -> Plan:
         """Stay, or go to a better place; go back to its place after another behavior's turn."""
         plan = now.plan()
         quiet_until = holds(self.quiet, now.time)
-        # As after a visit, or when the run begins.
+        # This happens after a visit, or when the run begins.
         is_in_avoided_room = now.room is not None and now.room.index in self.avoided
         if quiet_until is not None and not is_in_avoided_room:
             return plan.stay(until=quiet_until)
@@ -319,7 +320,7 @@ class Hangout(BeliefBehavior):
     def _choose(self, now: Situation, plan: Plan) -> None:
         """Choose the place to stand at until the next period."""
         output = self.output(now)
-        if output is None or output is not self.rated_output:  # an output never changes
+        if output is None or output is not self.rated_output:  # outputs never change
             self._rate(self.belief(now, self.user).joint)
             self.rated_output = output
         if self._stays(plan):
@@ -333,9 +334,10 @@ class Hangout(BeliefBehavior):
         plan.note(EventKind.RELOCATES, now.home.plan.rooms[room].name)
 
     def _stays(self, plan: Plan) -> bool:
-        """Return whether no place is better, however short the way there, and long its own.
+        """Return whether no place can be better, even without the costs of the ways.
 
-        It spares robots that yield the ways to all places, as they stand elsewhere each time.
+        This spares the computation of the ways to all places for robots that yield, which stand
+        elsewhere each time.
         """
         if self.place is None:
             return False
@@ -358,7 +360,7 @@ class Hangout(BeliefBehavior):
         probabilities = joint.tobytes()
         if probabilities != self.rated_by:
             gain = np.zeros(len(self.places.points))
-            # Summed in a fixed order, unlike in a matrix product: the same on every machine.
+            # Unlike a matrix product, this sums in a fixed order, the same on every machine.
             for room, chance in enumerate(joint.tolist()):
                 gain += chance * self.nearness[:, room]
             self.rated_by = probabilities
@@ -368,7 +370,7 @@ class Hangout(BeliefBehavior):
     def _ways(self, actor: Actor) -> F64:
         """Return the cost of the way to each place, float64 (n,), infinite without a way.
 
-        The robot decides often, but stands at few places: costs are kept by position, until its
+        The robot decides often but stands at few places, so costs are cached by position until its
         space changes.
         """
         space = actor.space
@@ -385,7 +387,7 @@ class Hangout(BeliefBehavior):
         return self.ways[1][cell]
 
     def _face_room(self, now: Situation, plan: Plan) -> None:
-        """Turn to the middle of the room that it stands in."""
+        """Turn to the middle of the present room."""
         room = now.home.plan.rooms[int(self.places.room[self.place])]
         x, y = now.home.lattice.point_at(room.anchor_xy)
         if (x, y) != plan.position:

@@ -1,4 +1,4 @@
-"""Interacting with people: those whom a robot has a request for, and those who come by."""
+"""Interaction with people: requests of a robot to them, and opportunities when they come by."""
 
 import math
 from datetime import datetime, timedelta
@@ -28,25 +28,25 @@ from fleet2d.runtime.events import EventKind
 Step = Literal["seek", "ask", "carry_out"]
 # A person who gave no answer isn't asked again before having moved this far [m].
 MOVED_M = 1.0
-# It looks for a person who is at home with this probability, by `source`, at least.
+# It looks for a person only above this probability of being at home, by `source`.
 SOUGHT_FROM = 0.25
 # It looks into the likeliest rooms, until they have this part of the probability.
 ENOUGH = 0.9
-# No source is surer that a person is at home: without one, all of the probability is there.
+# Without a source, all of the probability is at home; it counts as at most this.
 MOST_SURE = 0.9
-# The least time between two rounds for a person; and from no answer, or from seeing who gave none
-# in the same place, to the next round.
+# The least times from one round for a person to the next, and to a round from an unanswered
+# question, or from seeing that person in the same place.
 SEARCH_PAUSE = timedelta(minutes=30)
 UNANSWERED_PAUSE = timedelta(hours=4)
 SATURDAY = 5
-# How long its answer to a question takes.
+# An answer of the robot takes this time.
 REPLY_TAKES = timedelta(seconds=10)
-# It tries again after this time if somebody was in the way.
+# If somebody was in the way, it tries again after this time.
 DETOUR_PAUSE = timedelta(minutes=2)
 
 
 class RoundCount(NamedTuple):
-    """How many rounds found a person, of how many, in an hour of the day; older ones count less."""
+    """Rounds, and those that found a person, in an hour of the day; older ones count less."""
 
     found: float
     rounds: float
@@ -54,7 +54,7 @@ class RoundCount(NamedTuple):
 
 
 class RoundMemory:
-    """What rounds through the home say about whether each person is there.
+    """The evidence of rounds through the home on whether each person is there.
 
     In each hour of working days and of weekends, the share of rounds that found the person is mixed
     with the usual probability, which counts as two rounds; a round counts half after 14 days.
@@ -69,7 +69,7 @@ class RoundMemory:
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, bool, int], RoundCount] = {}
-        # When the last round ended without the person, and the probability right after it.
+        # The end of the last round without the person, and the probability right afterwards.
         self._empty: dict[str, tuple[datetime, float]] = {}
 
     def chance(self, person: str, time: datetime, usual: float) -> float:
@@ -80,12 +80,12 @@ class RoundMemory:
         return least + min(1.0, (time - since) / self.DOUBT_LASTS) * max(0.0, chance - least)
 
     def note_found(self, person: str, time: datetime) -> None:
-        """Remember that a person was there, on a round or not."""
+        """Remember that a person was seen, on a round or not."""
         self._add(person, time, found=1)
         self._empty.pop(person, None)
 
     def note_empty(self, person: str, time: datetime, usual: float, enough: float) -> timedelta:
-        """Remember that a round missed a person; return when the chance is `enough` again."""
+        """Remember that a round missed a person; return the time until the chance is `enough`."""
         chance = self.chance(person, time, usual)
         self._add(person, time, found=0)
         missed = self.MISSED * chance
@@ -111,14 +111,14 @@ def _hour_of(person: str, time: datetime) -> tuple[str, bool, int]:
 
 
 class ServedRequest(NamedTuple):
-    """What the robot is doing about a request.
+    """The state of serving a request.
 
     Attributes:
         request: The request.
-        step: What its last plan was for.
+        step: The purpose of the last plan.
         text: The interaction and the person, as events name them.
-        place: Where the person was perceived when addressed [m].
-        came_from: Where the robot was before it approached the person [lattice].
+        place: Perceived position of the person when addressed [m].
+        came_from: Position of the robot before it approached the person [lattice].
     """
 
     request: Request
@@ -131,33 +131,33 @@ class ServedRequest(NamedTuple):
 class Interact(BeliefBehavior):
     """Serve the requests of `interactions:`: approach, address, wait for the answer, carry out.
 
-    It looks for the person of the most valuable request on a round through the rooms where `source`
-    believes the person to be, likeliest first, up to nine tenths of the probability; not while the
-    person is likely out of the home. Rounds that find nobody are evidence for that (`RoundMemory`):
-    the robot looks again once the person was seen, or is likely enough at home at that hour, after
-    30 min at least. A person in view is approached and addressed; the robot waits for `patience`.
-    What is accepted is carried out. Otherwise the robot goes back to where it came from, and comes
-    back at the time that the person named, or after `retry` of the interaction. A person who gave
-    no answer isn't addressed again in the same place, and not looked for within 4 h, unless seen in
-    another one: a sleeper isn't asked twice. Nobody is addressed in a room that the robot was told
-    to keep out of.
+    The robot looks for the person of the most valuable request on a round through the rooms where
+    `source` believes the person to be, likeliest first, up to nine tenths of the probability; not
+    while the person is likely out of the home. Rounds that find nobody are evidence for that
+    (`RoundMemory`): the robot looks again once the person was seen, or is likely enough at home at
+    that hour, after 30 min at least. A person in view is approached and addressed; the robot waits
+    for `patience`. Accepted requests are carried out. Otherwise the robot goes back to where it
+    came from, and comes back at the time that the person named, or after `retry` of the
+    interaction. A person who gave no answer isn't addressed again in the same place, and not looked
+    for within 4 h, unless seen in another one: a sleeper isn't asked twice. Nobody is addressed in
+    a room from which the robot is banned.
 
-    With `timing` it asks an algorithm first: when a request comes up, when the person comes into
-    view, and at most every `look`, it serves it with the probability that the algorithm names for
-    the hour and the room of the person, seen or believed. A request that was put off is taken up
-    only at moments that are better than those before.
+    With `timing`, an algorithm decides first: when a request comes up, when the person comes into
+    view, and at most every `look`, the robot serves the request with the algorithm's probability
+    for the hour and the room of the person, seen or believed. A request that was put off is taken
+    up only at better moments than before.
 
-    It answers the questions of people (`replies`). Events, with the interaction and the person:
-    `opportunity`, with that probability and what was drawn, `asks`, the answer, `delivered` and
+    The robot answers questions of people (`replies`). Events, with the interaction and the person:
+    `opportunity`, with that probability and the draw, `asks`, the answer, `delivered` and
     `withdraws`.
 
     Attributes:
-        user: Whose requests it serves, or anyone's.
-        timing: The algorithm that knows when a person welcomes what; left out: at once.
+        user: The person whose requests are served, or anyone.
+        timing: The algorithm that knows good moments for requests; left out: at once.
         look: Least time between two draws for a request.
-        patience: How long it waits for an answer.
-        again: Time after an answer other than yes before it addresses the same person again.
-        seek: Whether it looks for people; else it serves only those who come into view.
+        patience: Time of waiting for an answer.
+        again: Time after an answer other than yes before the same person is addressed again.
+        seek: Whether the robot looks for people; else it serves only those who come into view.
     """
 
     records = frozenset(
@@ -177,7 +177,7 @@ class Interact(BeliefBehavior):
     seek: bool = True
 
     def reads(self) -> tuple[str, ...]:
-        """Return the algorithms that it reads."""
+        """Return the algorithms to read."""
         own = () if self.timing is None else (self.timing,)
         return super().reads() + own
 
@@ -185,21 +185,21 @@ class Interact(BeliefBehavior):
         """Check that it has a camera."""
         check_has_camera(actor, "interact")
         self.served: ServedRequest | None = None
-        self.plan: Plan | None = None  # the last one that addresses somebody
-        self.set_aside: dict[str, datetime] = {}  # until when each request isn't considered
-        self.unanswered: dict[str, Point] = {}  # where a person gave no answer
+        self.plan: Plan | None = None  # the last plan that addresses somebody
+        self.set_aside: dict[str, datetime] = {}  # times until which requests aren't considered
+        self.unanswered: dict[str, Point] = {}  # places where people gave no answer
         self.best_so_far: dict[str, tuple[datetime, float]] = {}  # best chance of each request
-        self.left_alone: dict[str, datetime] = {}  # until when each person isn't addressed
+        self.left_alone: dict[str, datetime] = {}  # times until which people aren't addressed
         self.at_home = RoundMemory()
-        self.not_sought: dict[str, datetime] = {}  # until when it doesn't look for each person
+        self.not_sought: dict[str, datetime] = {}  # times until which people aren't sought
 
     def awaits(self, now: Situation) -> frozenset[str]:
-        """Leave out `user_seen` unless it waits for somebody to come into view."""
+        """Leave out `user_seen` unless a request waits for somebody to come into view."""
         waits = any(self._waits_for(now, request) for request in self._ready(now))
         return self.listens if waits else self.listens - {EventKind.USER_SEEN}
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when a request may be served that has to wait now."""
+        """Return the time at which a waiting request may be served."""
         queue = now.requests
         if queue is None or not queue.open:
             return None
@@ -211,11 +211,11 @@ class Interact(BeliefBehavior):
         return min(later, default=None)
 
     def busy(self) -> bool:
-        """Return whether it is with a person, which hours don't end."""
+        """Return whether the robot is with a person, which hours don't end."""
         return self.served is not None and self.served.step in ("ask", "carry_out")
 
     def give_up(self, now: Situation) -> None:
-        """Drop the way to a person: somebody is in the way."""
+        """Drop the way to a person, since somebody is in the way."""
         if self.served is not None:
             self.not_sought[self.served.request.to] = now.time + DETOUR_PAUSE
         self.served = None
@@ -236,14 +236,14 @@ class Interact(BeliefBehavior):
         return plan
 
     def _take_served(self, now: Situation) -> ServedRequest | None:
-        """Return and forget what it is doing; None if another behavior has interrupted that."""
+        """Return and forget the served request; None if another behavior has interrupted that."""
         served = self.served
         if served is None:
             return None
         self.served = None
         if now.actor.plan.root is self.plan:
             return served
-        if served.step == "ask":  # maybe it was sent away
+        if served.step == "ask":  # the robot may have been sent away
             self.left_alone[served.request.to] = now.time + self.again
         return None
 
@@ -258,7 +258,7 @@ class Interact(BeliefBehavior):
     def _address(
         self, now: Situation, ready: list[Request], served: ServedRequest | None
     ) -> Plan | None:
-        """Address the person of a request who is in view; None: of none."""
+        """Address the person of a request who is in view; None: nobody is."""
         in_view = now.in_view
         for request in ready:
             place = in_view.get(request.to)
@@ -274,7 +274,7 @@ class Interact(BeliefBehavior):
         return [each for each in ready if self.user in (ANYONE, each.to)]
 
     def _waits_for(self, now: Situation, request: Request) -> bool:
-        """Return whether it would address the person of a request now, if in view."""
+        """Return whether the person of a request would be addressed now, if in view."""
         rests = self.set_aside.get(request.text), self.left_alone.get(request.to)
         return all(until is None or until <= now.time for until in rests)
 
@@ -314,7 +314,7 @@ class Interact(BeliefBehavior):
         return True
 
     def _leaves_alone(self, now: Situation, request: Request, place: Point) -> bool:
-        """Return whether it doesn't address the person of a request at a place; nothing changes."""
+        """Return whether the person of a request is left alone at a place; nothing changes."""
         if self.left_alone.get(request.to, now.time) > now.time:
             return True
         if is_in_rooms(now, *place, now.actor.banned(now.step)):
@@ -332,7 +332,7 @@ class Interact(BeliefBehavior):
         self.set_aside[request.text] = now.time + self.look
         since, best = self.best_so_far.get(request.text, (request.since, 0.0))
         best = best if since == request.since else 0.0
-        # It is asked at the first moment whose chance exceeds a threshold drawn for the request.
+        # The request is served at the first moment whose chance exceeds a threshold drawn for it.
         chance = max(0.0, (self._asking_probability(now, self.timing, request) - best) / (1 - best))
         is_drawn = now.random(f"timing {request.text}").uniform() < chance
         best = 0.0 if is_drawn else best + chance * (1 - best)
@@ -345,7 +345,7 @@ class Interact(BeliefBehavior):
         """Return the probability that an algorithm asks now; 1 before its first output.
 
         Raises:
-            ComponentError: Its output has no such probabilities.
+            ComponentError: The algorithm's output has no such probabilities.
         """
         output = now.outputs.get(timing)
         if output is None:
@@ -383,7 +383,7 @@ class Interact(BeliefBehavior):
         return plan
 
     def _react(self, now: Situation, served: ServedRequest) -> Plan:
-        """Carry out what was accepted, or withdraw after another answer."""
+        """Carry out an accepted request, or withdraw after another answer."""
         request = served.request
         to = served.text.rpartition(" ")[2]
         answers = answers_to(now, served.text)
@@ -402,7 +402,7 @@ class Interact(BeliefBehavior):
         return plan.go_to_point(*served.came_from).stay(timedelta(seconds=1))
 
     def _seek(self, now: Situation, request: Request, joint: F64) -> Plan:
-        """Look into the likeliest rooms, on one round; the person may come into view on the way."""
+        """Look into the likeliest rooms on one round, on which the person may come into view."""
         chances = joint.tolist()
         rooms = now.actor.reachable_rooms()
         rooms.sort(key=lambda room: (-chances[room.index], room.index))
@@ -442,7 +442,7 @@ def answers_to(now: Situation, text: str) -> list[str]:
 
 
 def _carry_out(now: Situation, request: Request, text: str) -> Plan:
-    """Return a plan to do what somebody accepted: deliver it to whom it is for, or collect it."""
+    """Return a plan to carry out an accepted request, such as to collect or deliver something."""
     interaction = request.interaction
     is_delivered = text.rpartition(" ")[2] == interaction.to
     done = EventKind.DELIVERED if is_delivered else EventKind.COLLECTS
@@ -452,19 +452,18 @@ def _carry_out(now: Situation, request: Request, text: str) -> Plan:
 class Opportunistic(Behavior):
     """Approach a person who comes into view, and interact for a while.
 
-    The behavior that it interrupts goes on afterwards. It goes to where the person was perceived; a
-    person who walks on in the meantime isn't followed. Events: `approaches`, `interacts`, with the
-    name of the person as perceived, and `interaction_over`. If the robot wants something of the
-    person (`interactions:`), it asks for it (`asks`), and carries out what is accepted
-    (`delivered`).
+    The interrupted behavior goes on afterwards. The robot goes to the perceived position; a person
+    who walks on in the meantime isn't followed. Events: `approaches`, `interacts`, with the name of
+    the person as perceived, and `interaction_over`. If the robot has a request to the person
+    (`interactions:`), it asks (`asks`), and carries out an accepted one (`delivered`).
 
     Attributes:
-        users: Users that it approaches; left out: everybody, recognized or not.
-        distance: How near it comes [m]; personal space ends at 1.2 m.
-        interaction: How long it interacts.
-        chance: Probability that it takes an opportunity.
+        users: Users to approach; left out: everybody, recognized or not.
+        distance: Distance to the person [m]; personal space ends at 1.2 m.
+        interaction: Duration of an interaction.
+        chance: Probability of taking an opportunity.
         again: Minimum time between two approaches to the same person.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, in which it leaves people alone.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, in which to leave people alone.
     """
 
     records = frozenset(
@@ -483,15 +482,15 @@ class Opportunistic(Behavior):
     no_stops_in: tuple[str, ...] = ()
 
     def about(self) -> tuple[str, ...]:
-        """Return the users that it approaches, if only some."""
+        """Return the users to approach, if only some."""
         return self.users
 
     def start(self, actor: Actor) -> None:
         """Check that it has a camera."""
         check_has_camera(actor, "opportunistic")
         self.avoided = avoided_rooms(actor, "opportunistic.no_stops_in", self.no_stops_in)
-        self.asked: tuple[Request, str] | None = None  # the request, as events named it
-        self.left_alone: dict[str, datetime] = {}  # until when each person isn't approached
+        self.asked: tuple[Request, str] | None = None  # the request, with its text in events
+        self.left_alone: dict[str, datetime] = {}  # times until which people aren't approached
 
     def decide(self, now: Situation) -> Plan | None:
         """Approach somebody in view, or leave the decision to later behaviors."""

@@ -1,4 +1,4 @@
-"""Rounds of a robot: through rooms, along waypoints or a recorded path; visits at set times."""
+"""Rounds of a robot through rooms, along waypoints or a recorded path, and visits at set times."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -36,8 +36,8 @@ from fleet2d.kernels import I64
 from fleet2d.runtime.clock import DAY, midnight_of
 from fleet2d.runtime.events import EventKind
 
-SPACING_M = 0.1  # points of a retraced path that are nearer to the last are left out
-MAX_NAMED = 6  # how many rooms a note names
+SPACING_M = 0.1  # nearer points of a retraced path are left out
+MAX_NAMED = 6  # most rooms that a note names
 
 
 class Patrol(Behavior):
@@ -47,14 +47,14 @@ class Patrol(Behavior):
     places. Stops behind a shut door are left out of a round.
 
     Attributes:
-        rooms: The rooms of a round; all: every room that it can enter.
+        rooms: The rooms of a round; all: every room that the robot can enter.
         waypoints: Points [x, y] in metres to go to instead of rooms.
-        dwell: How long it stays at each stop.
+        dwell: Time at each stop.
         order: Stops in the order given, or reshuffled for each round.
         look_around: Turn once on the spot on arriving at a stop.
         no_stops_in: Rooms, or kinds of rooms if the home has them, without stops.
-        stop_at: Where it stops in a room that a round names: in its middle, or at up to four points
-            from which it sees all places at the room's furniture (without any, 95 % of the floor).
+        stop_at: The stops in a room that a round names: its middle, or up to four points with a
+            view of all places at the room's furniture (without any, 95 % of the floor).
     """
 
     always_decides = True
@@ -76,7 +76,7 @@ class Patrol(Behavior):
             raise problem("there is nowhere to go: name rooms, or waypoints, or leave out 'rooms'")
 
     def start(self, actor: Actor) -> None:
-        """Find the stops, and note what a robot that does nothing else never sees from them."""
+        """Find the stops, and note the places that are never in view from them."""
         if self.waypoints:
             stops = [actor.point(point) for point in self.waypoints]
         elif self.rooms == "all":
@@ -117,7 +117,7 @@ class Patrol(Behavior):
         turns = 1.0 if self.look_around else 0.0
         if not now.actor.may_block_routes:
             return plan.visit(stops, turns, self.dwell) if stops else plan.stay(self.dwell)
-        # In a later round a door may be open that is shut at present, or costs lower.
+        # In a later round, a door may be open again, or costs lower.
         reached = [stop for stop in stops if self._visits(plan, stop, turns)]
         return plan if reached else plan.stay(self.dwell)
 
@@ -130,15 +130,15 @@ class Patrol(Behavior):
 
 
 class ScheduledVisit(Settings):
-    """One visit: when, where, and for how long.
+    """A visit: its time, place and duration.
 
     Attributes:
         at: Time of day at which the robot sets out.
         place: The destination: a room, a kind of room, or a point.
-        dwell: How long it stays there.
-        on: The days on which it is made.
+        dwell: Time of staying there.
+        on: The days of the visit.
         look_around: Turn once on the spot on arriving.
-        task: The task that is done there, for the events table.
+        task: The task there, for the events table.
     """
 
     at: TimeOfDay
@@ -152,7 +152,7 @@ class ScheduledVisit(Settings):
 class Scheduled(Behavior):
     """Visit rooms at fixed times of the day; between visits, later behaviors decide.
 
-    It interrupts them when a visit is due. If `preempts` is false, a visit is made once they have
+    A visit interrupts them when it is due. If `preempts` is false, a visit is made once they have
     no plan, no later than `late` after its time; a visit behind a shut door, once the door is open.
     In a room the robot stops at the point farthest from its walls. Events: `visits`, with the task,
     else the room, and `way_blocked`, with the room.
@@ -160,8 +160,8 @@ class Scheduled(Behavior):
     Attributes:
         visits: The visits.
         late: A visit that can't begin within this time is left out.
-        no_stops_in: Rooms, or kinds of rooms if the home has them, that it doesn't visit: visits
-            there are left out, with a note.
+        no_stops_in: Rooms, or kinds of rooms if the home has them, not to visit: visits there are
+            left out, with a note.
     """
 
     records = frozenset({EventKind.VISITS, EventKind.WAY_BLOCKED})
@@ -185,7 +185,7 @@ class Scheduled(Behavior):
         self.pending: list[tuple[datetime, int]] = []  # due time and number of visits to make
 
     def wakes_at(self, now: Situation, plan: Plan) -> datetime | None:
-        """Return when the next visit is due, or a shut door is tried again."""
+        """Return the time at which the next visit is due, or a shut door is tried again."""
         visits = self._due(max(self.last_decision, now.time))
         times = [due for due, _ in islice(visits, 1)]
         if self.pending:
@@ -240,9 +240,9 @@ class Retrace(Behavior):
     """Drive the path in the map of a Valetudo robot, in the home of that map, at the robot's speed.
 
     The map has no times; for a log with times use the behavior `replay`. Points nearer to each
-    other than 0.1 m are thinned out. A point that the body can't get to is replaced by the
-    nearest one that it can, if that is within `reach`. At the end of the path it starts again,
-    after `cooldown`. Events: `retraces`, with the number of points, and `retraced`.
+    other than 0.1 m are thinned out. A point that the body can't reach is replaced by the nearest
+    reachable one, if that is within `reach`. At the end of the path the robot starts again, after
+    `cooldown`. Events: `retraces`, with the number of points, and `retraced`.
 
     Attributes:
         path: The map's JSON file.

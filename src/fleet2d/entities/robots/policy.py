@@ -1,4 +1,4 @@
-"""Policy: a robot whose next room is chosen by a learned policy, from what the robot knows.
+"""Policy: a robot whose next room is chosen by a learned policy, from the robot's knowledge.
 
 An observation is a table with a row for each room, padded to a fixed number of rooms; the last
 columns are the same in all rows. So a policy that scores rows applies to any home, and one network
@@ -33,7 +33,7 @@ from fleet2d.runtime.clock import DAY_MINUTES, DAY_US, HOUR_S, Clock
 from fleet2d.runtime.events import EventKind
 from fleet2d.runtime.local_time import even_parts
 
-# How many people have columns of their own, in the order of the scenario.
+# This many people have columns of their own, in the order of the scenario.
 PEOPLE = 4
 HOURS = 24
 NEVER = -1
@@ -52,16 +52,16 @@ KINDS: dict[str, tuple[str, ...]] = {
 KIND_OF_TYPE = {room_type: kind for kind, types in KINDS.items() for room_type in types}
 
 COLUMNS = (
-    # Of the home
+    # The home
     *("room", "reachable", "area"),
     *(f"is_{kind}" for kind in KINDS),
-    # Of the robot
+    # The robot
     *("here", "way", "visited_20min", "visited_6h"),
-    # Of the person, or of anyone
+    # The person, or anyone
     *("belief", "in_view", "seen_30min", "seen_6h", "habit", "habit_now"),
-    # Of each of the first people
+    # Each of the first people
     *(f"{name}_{n}" for n in range(PEOPLE) for name in ("belief", "seen_30min", "habit_now")),
-    # The same in all rooms
+    # Values that are the same in all rooms
     *("hour_sin", "hour_cos", "weekend", "away", "charge", "last_seen", "elapsed"),
 )
 """The columns of an observation, in their order: see docs/how-to/gym.md."""
@@ -89,12 +89,12 @@ SEEN_S = 30 * 60
 LONG_S = 6 * HOUR_S
 # A way that takes this long, or longer, counts 1 [s].
 LONGEST_WAY_S = 60.0
-# The ways from so many places are kept.
+# The ways from at most this many places are cached.
 KEPT_WAYS = 256
 
 
 class SightingMemory:
-    """When and where a robot perceived people: all that it remembers of its sightings.
+    """The memory of a robot's sightings: times and rooms, by person.
 
     Attributes:
         rooms: The sightings by person and room.
@@ -133,7 +133,7 @@ class SightingMemory:
 
 
 def _no_sightings(shape: tuple[int, int]) -> RoomMemory:
-    """Return the memory of so many people and rooms before any sighting."""
+    """Return the memory of a number of people and rooms before any sighting."""
     return RoomMemory(
         np.full(shape, NEVER, np.int64),
         np.zeros((*shape, HOURS), np.int64),
@@ -142,11 +142,11 @@ def _no_sightings(shape: tuple[int, int]) -> RoomMemory:
 
 
 class WaitingPoses:
-    """Where a robot stands in each room to see as much of it as possible, and how far apart.
+    """The poses with the largest view of each room, and the ways between them.
 
     Attributes:
-        points: Lattice points (rooms, 2), of the rooms that it can enter.
-        headings: The heading there, int64 (rooms,) [1/4096 turn].
+        points: Lattice points (rooms, 2) in the rooms that the robot can enter.
+        headings: The headings at these points, int64 (rooms,) [1/4096 turn].
         index: The index of each of these rooms, int64 (rooms,).
         number: Their numbers, by index.
     """
@@ -160,8 +160,8 @@ class WaitingPoses:
         self.index, self.points, self.headings = home.cached(("standing", *key), self._choose)
         self._key = key
         self.number = {room: number for number, room in enumerate(self.index.tolist())}
-        self._distances: PointDistances | None = None  # in its present space
-        self._ways: dict[tuple[int, int, int], RoomWays] = {}  # from the places where it was in it
+        self._distances: PointDistances | None = None  # for the present space
+        self._ways: dict[tuple[int, int, int], RoomWays] = {}  # by starting point
 
     def _choose(self) -> tuple[I64, I64, I64]:
         rooms = self._actor.reachable_rooms()
@@ -187,7 +187,7 @@ class WaitingPoses:
         return at_x, at_y, facing * TURN // DIRECTIONS
 
     def ways(self, actions: int) -> "RoomWays":
-        """Return the ways from where the robot is to each room, for a number of actions."""
+        """Return the ways from the robot to each room, for a number of actions."""
         actor = self._actor
         space = actor.space
         if self._distances is None or self._distances.space is not space:
@@ -202,13 +202,13 @@ class WaitingPoses:
                 self._ways.clear()
             metres = self._distances.of((x, y))
             if not np.isfinite(metres).any():
-                # It was interrupted so near to a corner that the middle of its cell isn't free.
+                # Near a corner, the middle of the robot's cell may not be free.
                 metres = self._distances.of(space.nearest(x, y, actor.part) or (x, y))
             ways = self._ways[x, y, actions] = self._measure(metres, actions)
         return ways
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what follows from the home."""
+        """Leave out distances and ways, which follow from the home."""
         return {**self.__dict__, "_distances": None, "_ways": {}}
 
     def _measure(self, metres: F64, actions: int) -> "RoomWays":
@@ -223,11 +223,11 @@ class WaitingPoses:
 
 
 class RoomWays(NamedTuple):
-    """How far the rooms are from where a robot is.
+    """The ways from a robot's position to the rooms.
 
     Attributes:
-        share: How long each way takes as a share of LONGEST_WAY_S, 1 at most, 0 for rooms in which
-            it can't stand, float32 (rooms,).
+        share: The time of each way as a share of LONGEST_WAY_S, 1 at most, 0 for rooms in which the
+            robot can't stand, float32 (rooms,).
         mask: Which actions are possible, bool (actions,): rooms with a way, and last to rest.
     """
 
@@ -236,7 +236,7 @@ class RoomWays(NamedTuple):
 
 
 def shown_memory(names: Sequence[str], user: str) -> ShownMemory:
-    """Return what observations show of the memory: about a person, or ANYONE, among some people."""
+    """Return the part of the memory that observations show, about a person, or ANYONE."""
     person = len(names) + 1 if user == ANYONE else names.index(user)
     people = range(min(len(names), PEOPLE))
     fresh = ["visited_20min", "visited_6h", "seen_30min", "seen_6h"]
@@ -254,8 +254,8 @@ def shown_memory(names: Sequence[str], user: str) -> ShownMemory:
 class LearnedBehavior(BeliefBehavior):
     """Base of behaviors whose decisions come from a file, a class, or an environment.
 
-    An observation has a row for each of the things that it chooses among, padded to a fixed number
-    of rows. Action r is to take row r; the last one is to take none of them.
+    An observation has a row for each option, padded to a fixed number of rows. Action r is to take
+    row r; the last one is to take none.
 
     Attributes:
         file: The policy, an ONNX file; left out: a class of yours, or an environment, decides.
@@ -283,7 +283,7 @@ class LearnedBehavior(BeliefBehavior):
         Raises:
             InputError: The file is no policy.
         """
-        self.given: int | None = None  # the next action, if an environment decides
+        self.given: int | None = None  # next action from an environment
         if self.file is not None:
             open_network(self.file, INPUTS)
 
@@ -296,7 +296,7 @@ class LearnedBehavior(BeliefBehavior):
         raise NotImplementedError
 
     def asks(self, now: Situation) -> bool:
-        """Return whether its decision at a step depends on the policy; nothing changes by it."""
+        """Return whether the decision at a step depends on the policy; nothing changes."""
         raise NotImplementedError
 
     def why_not(self, now: Situation, row: int) -> str:
@@ -342,7 +342,7 @@ class LearnedBehavior(BeliefBehavior):
         """Refuse an impossible action.
 
         Raises:
-            InputError: It is out of range, or masked; the message says why.
+            InputError: The action is out of range, or masked; the message says why.
         """
         if not (isinstance(action, int | np.integer) and 0 <= action <= self.rows):
             raise InputError(
@@ -353,7 +353,7 @@ class LearnedBehavior(BeliefBehavior):
 
 
 class Policy(LearnedBehavior):
-    """Let a learned policy choose the next room: to wait in, to look for a person in, or to visit.
+    """Let a learned policy choose the next room: to wait in, to search, or to visit.
 
     The policy is a file of ONNX with the inputs `observation`, float32 (1, rooms, columns), and
     optionally `action_mask`, bool (1, rooms + 1), whose first output has a score for each of the
@@ -369,8 +369,8 @@ class Policy(LearnedBehavior):
         task: To wait where people are in view (hangout); to look for a person (find); or to visit
             rooms (patrol).
         rooms: Number of rooms in an observation; a home may have fewer.
-        period: How long it waits in a room (hangout), or when it rests.
-        dwell: How long it stays in a visited room (patrol).
+        period: Time of waiting in a room (hangout), or of rest.
+        dwell: Time in a visited room (patrol).
         every: Interval between the beginnings of two searches (find), from the start on.
         deadline: Duration of a search after which it gives up (find).
     """
@@ -398,7 +398,7 @@ class Policy(LearnedBehavior):
         return self.rooms
 
     def start(self, actor: Actor) -> None:
-        """Choose where it stands in each room.
+        """Choose the pose in each room.
 
         Raises:
             ScenarioError: The robot has no camera.
@@ -417,13 +417,13 @@ class Policy(LearnedBehavior):
         self.sites = Sites(actor, 2) if self.task != "hangout" else None
         self.names = list(actor.people)
         self.visited = np.full(count, NEVER, np.int64)
-        self.since: datetime | None = None  # when the present search began
+        self.since: datetime | None = None  # beginning of the present search
         self.due = actor.clock.start
         self._fixed = self._describe_home(actor)
         self._shown = shown_memory(self.names, self.user)
         self._person = int(self._shown.fresh_rows[PERSON])
 
-    # What it knows
+    # Observations
 
     def observe(self, now: Situation) -> F32:
         """Return the observation, float32 (rooms, columns): see docs/how-to/gym.md."""
@@ -472,7 +472,7 @@ class Policy(LearnedBehavior):
         return self.poses.ways(self.rooms + 1).mask
 
     def _describe_home(self, actor: Actor) -> F32:
-        """Return what never changes in observations, float32 (rooms, columns)."""
+        """Return the constant part of observations, float32 (rooms, columns)."""
         table = np.zeros((self.rooms, len(COLUMNS)), np.float32)
         cells = sum(room.cells for room in actor.home.rooms)
         for room in actor.home.rooms:
@@ -485,20 +485,20 @@ class Policy(LearnedBehavior):
         table[self.poses.index, _AT["reachable"]] = 1
         return table
 
-    # What it does
+    # Decisions
 
     def asks(self, now: Situation) -> bool:
-        """Return whether its decision at a step depends on the policy."""
+        """Return whether the decision at a step depends on the policy."""
         if self.task != "find":
             return True
         return not self._is_idle(now) and self._search_end(now) is None
 
     def _is_idle(self, now: Situation) -> bool:
-        """Return whether it has no search to do at a step."""
+        """Return whether there is no search to do at a step."""
         return self.since is None and now.time < self.due
 
     def _search_end(self, now: Situation) -> EventKind | None:
-        """Return how its search ends at a step; None: it goes on."""
+        """Return the event that ends the search at a step; None: it goes on."""
         in_view = now.in_view
         if self.user in in_view or (self.user == ANYONE and in_view):
             return EventKind.FOUND
@@ -526,7 +526,7 @@ class Policy(LearnedBehavior):
         return self._rest(now, plan)
 
     def _end_search(self, now: Situation, plan: Plan, end: EventKind) -> Plan:
-        """Note how a search ends, and wait for the next one."""
+        """Note the end of a search, and wait for the next one."""
         self.since = None
         while self.due <= now.time:
             self.due += self.every
@@ -538,7 +538,7 @@ class Policy(LearnedBehavior):
         return f"room {row}, which {reason}"
 
     def _rest(self, now: Situation, plan: Plan) -> Plan:
-        """Charge, if it has a battery; else stay where it is."""
+        """Charge, if there is a battery; else stay."""
         charge = now.actor.charge
         lasts = self.period
         if charge is not None and plan.reaches(*charge.charger):

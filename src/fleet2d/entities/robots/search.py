@@ -97,7 +97,7 @@ def random_order(problem: SearchProblem, draws: Draws) -> list[int]:
 
 
 def nearest_first(problem: SearchProblem) -> list[int]:
-    """Return the order that goes to the nearest site each time, whatever its probability.
+    """Return the order that takes the nearest site each time, whatever its probability.
 
     The time of a look counts as part of the way to its site.
     """
@@ -151,7 +151,7 @@ def exact(problem: SearchProblem) -> list[int]:
 def receding(problem: SearchProblem, horizon: int = HORIZON) -> list[int]:
     """Return the order of :func:`greedy`, with its first `horizon` sites in the best order.
 
-    Meant to be computed again after every look, with the probabilities after that look: only its
+    It is meant to be computed again after every look, with updated probabilities, so that only its
     first site is used.
     """
     rough = greedy(problem)
@@ -182,7 +182,7 @@ def after_empty_looks(prior: F64, age: F64, memory: float, detect: F64 | float =
     """Return the probabilities of the sites after looks without success, not normalized.
 
     A look that finds the target with probability d reduces the probability of its site by the part
-    d (Bayes). As people move, it counts less the older it is: by d * memory / (memory + age). With
+    d (Bayes). As people move, older looks count less: by d * memory / (memory + age). With
     d = 1, the result is the probability that another look from the same place finds the target: a
     target that was hidden there stays hidden.
 
@@ -231,7 +231,7 @@ def _solve(ways: F64, reach: F64, gain: F64) -> tuple[I8, int]:
     """
     count = len(gain)
     subsets = np.arange(1 << count, dtype=np.int64)
-    outside = np.zeros(1 << count)  # the gain of the sites outside each subset
+    outside = np.zeros(1 << count)  # gain of the sites outside each subset
     size = np.zeros(1 << count, np.int64)
     for j, chance in enumerate(gain.tolist()):
         outside += np.where(subsets >> j & 1, 0.0, chance)
@@ -245,7 +245,7 @@ def _solve(ways: F64, reach: F64, gain: F64) -> tuple[I8, int]:
         is_done = layer[:, None] & bits
         after = layer[:, None] | bits
         ahead = np.where(is_done, np.inf, cost[after, last])
-        # Indexed by subset, last site and next site; of equal ones, the first is chosen.
+        # Axes are subset, last site and next site; of equal costs, the first is chosen.
         total = outside[layer][:, None, None] * ways + ahead[:, None, :]
         choice[layer] = total.argmin(axis=2)
         cost[layer] = total.min(axis=2)

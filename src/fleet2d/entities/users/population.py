@@ -34,7 +34,7 @@ class Population(ResidentBehavior):
         self.details = actor.stream("details")
         draws = Draws(actor.stream("who"), 0)
         group: str = self.group
-        if group == "any":  # by its share of the people
+        if group == "any":  # drawn by the group's share of people
             names = survey.groups()
             groups = survey.table()["groups"]
             shares = [groups[name]["share"] for name in names]
@@ -47,8 +47,8 @@ class Population(ResidentBehavior):
         known = catalogue()
         used = {*survey.activities(self.people), REST}
         self.interruptions = actor.stream("needs")
-        # The survey doesn't record bodily needs, short errands, and a meal after hours without one:
-        # it counts their time as that of the interrupted activity.
+        # The survey counts bodily needs, short errands, and a meal after hours without one as part
+        # of the interrupted activity.
         needs = interruptions.population_needs()
         errands = interruptions.usual_errands()
         self.rules = interruptions.interruption_rules(needs, errands, known)
@@ -71,7 +71,7 @@ class Population(ResidentBehavior):
         return rooms_at(activities, time_s, known)
 
     def day(self, ordinal: int) -> Sequence[Episode]:
-        """Return what is done from 04:00 on the day of a date's ordinal to 04:00 on the next."""
+        """Return the episodes from 04:00 on the day of a date's ordinal to 04:00 on the next."""
         if ordinal not in self.cache:
             while len(self.states) <= ordinal - self.first:
                 self._live(self.first + len(self.states) - 1)

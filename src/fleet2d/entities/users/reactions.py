@@ -13,7 +13,7 @@ from fleet2d.routines.persona import Manners
 from fleet2d.runtime.determinism import Draws
 from fleet2d.runtime.events import EventKind
 
-# The events, the most important first, and the manner that is the probability of a reaction.
+# The manner that holds the probability of a reaction, by event, the most important first.
 PROBABILITIES = {
     "robot_calls": "comes",
     "robot_close": "leaves",
@@ -21,13 +21,13 @@ PROBABILITIES = {
     "robot_near": "turns",
 }
 RANKS = list(PROBABILITIES)
-# How far a person steps aside, and how far from a robot that called a person stops [m].
+# Distances to which a person steps aside, and at which one stops before a calling robot [m].
 STEP_M = 0.7
 MEET_M = 0.9
-CLEAR_M = 0.1  # minimum distance added to what is too close
-# How long a person who left a robot stays in the other room.
+CLEAR_M = 0.1  # margin beyond the distance that is too close
+# Time for which a person who has left a robot stays in the other room.
 LEAVES_FOR = DurationDistribution(mean=timedelta(minutes=5))
-# How long a person waits for a robot to pass.
+# Time for which a person waits for a robot to pass.
 PASSING_TIME = timedelta(seconds=4)
 DIRECTIONS = 16
 
@@ -35,8 +35,8 @@ DIRECTIONS = 16
 class Reactions(Behavior):
     """React to robots: turn to them, step aside, come, leave; list it before other behaviors.
 
-    The probability of each reaction, and how near a robot has to be, are the person's manners:
-    those given here, else those of the persona of a later `routine`, else the usual ones.
+    The probability of each reaction, and the distances, are the person's manners: those given here,
+    else those of the persona of a later `routine`, else the usual ones.
 
     Attributes:
         manners: The manners; left out: those of the persona.
@@ -57,7 +57,7 @@ class Reactions(Behavior):
             "leaves": LEAVES_FOR.table(),
             "comes": manners.comes_for.table(),
         }
-        # of the present reaction, and the step at which it ends
+        # rank of the present reaction, and the step at which it ends
         self.rank = 0
         self.until = -1
         units = actor.home.lattice.units_per_m
@@ -128,7 +128,7 @@ class Reactions(Behavior):
             step_x = x - plan.x
             step_y = y - plan.y
             along = step_x * dx + step_y * dy
-            # Across the robot's way; along it, the robot would come closer again.
+            # The step goes across the robot's way, as along it the robot would come closer again.
             if 4 * along**2 <= _squared(dx, dy) * _squared(step_x, step_y):
                 across.append((x, y))
         if across:

@@ -1,4 +1,4 @@
-"""Replay: be where a person was according to a log, in its rooms or at its positions."""
+"""Replay: people at the rooms or positions of a log."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -57,10 +57,10 @@ class Fixes:
     Attributes:
         time_us: Times [us since the start of the run], ascending, int64 (n,).
         xy: Positions, all free and reachable [lattice], int64 (n, 2).
-        heading: Headings [1/4096 turn], -1 where the log has none, int64 (n,).
+        heading: Headings [1/4096 turn], -1 for none in the log, int64 (n,).
         snapped: The number of fixes that were moved to the nearest free place.
         outside: The number of fixes that were left out, too far from any free place.
-        beyond_m: Their distance from the nearest free place, in the median [m]; 0 without any.
+        beyond_m: Median distance of these from the nearest free place [m]; 0 without any.
     """
 
     time_us: I64
@@ -83,7 +83,7 @@ def place_fixes(actor: Actor, time_us: I64, xy: F64, turns: F64, reach: float) -
     """
     lattice = actor.home.lattice
     space = actor.space
-    size = 1 << 20  # beyond any home, within 64 bits when squared
+    size = 1 << 20  # beyond any home, and squared within 64 bits
     clipped = np.clip(xy, -COORDINATE_LIMIT_M, COORDINATE_LIMIT_M)
     points: I64 = np.clip(lattice.to_lattice(clipped), -size, size)
     fits = [
@@ -116,7 +116,7 @@ class FixFollower:
         actor: The body.
         fixes: Its positions.
         gap_us: Two fixes farther apart in time than this have a gap between them.
-        gaps: What happens in a gap: "unknown": the body is away; "hold": it stays, and leaves in
+        gaps: The behavior in a gap: "unknown": the body is away; "hold": it stays, and leaves in
             time for the next fix; "walk": it takes all that time for the way.
     """
 
@@ -147,7 +147,7 @@ class FixFollower:
             elif time[j] - time[j - 1] <= self.gap_us:
                 self._leg(plan, j, plan.time_us)
             elif self.gaps == "unknown":
-                _vanish(plan, plan.time_us + 1)  # at the fix itself it is known
+                _vanish(plan, plan.time_us + 1)  # at the fix itself, the position is known
                 self.gap_count += 1
                 self.unknown_us += int(time[j] - time[j - 1])
                 self._appear(plan, j)
@@ -235,7 +235,7 @@ class RoomFollower:
     Args:
         actor: The body.
         visits: Its visits, in order; the first begins at step 0 or before.
-        at_once: Whether it goes to the next room as soon as it may, and waits there.
+        at_once: Whether the body goes to the next room as soon as it may, and waits there.
     """
 
     def __init__(self, actor: Actor, visits: Sequence[LoggedVisit], at_once: bool) -> None:
@@ -244,7 +244,7 @@ class RoomFollower:
         self.at_once = at_once
         self.step_us = actor.clock.step_us
         self.walks = self.hurried = self.implausible = 0
-        self.top_speed = 0.0  # of the walks [m/s]
+        self.top_speed = 0.0  # top speed of the walks [m/s]
         self._nearest: dict[int, Nearest] = {}
 
     def follow(self, plan: Plan, current: int, *, rejoin: bool) -> Plan:
@@ -253,8 +253,8 @@ class RoomFollower:
         Args:
             plan: An empty plan.
             current: The number of the visit at the beginning of the plan.
-            rejoin: Whether the body may be somewhere else, and walks to the visit's room first;
-                else it is put there.
+            rejoin: Whether the body may be elsewhere and walks to the visit's room first; else it
+                is put there.
         """
         if rejoin:
             self._catch_up(plan, self.visits[current])
@@ -267,7 +267,7 @@ class RoomFollower:
             visit = self.visits[i]
             arrive_us = visit.first * self.step_us
             self._note_activities(plan, before)
-            if arrive_us <= plan.time_us:  # still catching up
+            if arrive_us <= plan.time_us:  # the body is still catching up
                 self._catch_up(plan, visit)
             elif visit.place == UNKNOWN:
                 _vanish(plan, arrive_us)
@@ -294,7 +294,7 @@ class RoomFollower:
         return self.actor.find((visit.place,), begin_us, "spot")
 
     def _appear(self, plan: Plan, visit: LoggedVisit, at_us: int, *, known: bool = True) -> None:
-        """Put the body where the log has it."""
+        """Put the body at its place in the log."""
         x, y = self._spot(visit, plan)
         plan.jump(at_us, x=x, y=y, away=int(visit.place == AWAY))
         if known:
@@ -334,7 +334,7 @@ class RoomFollower:
     def _way(self, plan: Plan, spot: LatticePoint) -> I64:
         """Return the breakpoints of the way to a spot: time since its beginning, x, y, heading."""
         route = self.actor.space.route(plan.position, spot)
-        if route is None:  # a door is shut at present, but the log says that somebody went there
+        if route is None:  # a shut door didn't stop the person in the log
             route = straight_way(plan.position, spot)
         return time_route(route, 0, plan.heading, self.actor.speed, self.actor.turn_rate)
 
@@ -378,7 +378,7 @@ GAP_OF_FIXES = timedelta(minutes=1)
 
 
 def _vanish(plan: Plan, at_us: int) -> None:
-    """Make the body's position unknown: it is away, without having walked out."""
+    """Make the body's position unknown: away without having walked out."""
     plan.jump(at_us, away=1).note(EventKind.UNKNOWN)
 
 
@@ -388,7 +388,7 @@ def report_rooms(
     logged: LoggedVisits,
     follower: RoomFollower,
 ) -> tuple[str, ...]:
-    """Return lines about a log of rooms: which room each label means, omissions, gaps, haste."""
+    """Return lines about a log of rooms: the meaning of labels, omissions, gaps, haste."""
     lines = [_head(log, len(log.readings), "readings"), *log.notes]
     for label, count in sorted(log.rooms.items()):
         choice = mapped[label]
@@ -463,11 +463,11 @@ RoomMap = Annotated[
 
 
 class Replay(Behavior, LogKeys):
-    """Be where a person was according to a log: a smart home's events, a script, or positions.
+    """Follow a person's log: a smart home's events, a script, or positions.
 
-    When the log names a room, the body is in it at that step, as it left for it early enough. Where
-    the log says nothing, nothing is invented: the body is away then, and the events `unknown` and
-    `known` mark the gap.
+    When the log names a room, the body is in it at that step, having left early enough. In gaps of
+    the log nothing is invented: the body is away, and the events `unknown` and `known` mark the
+    gap.
 
     Attributes:
         path: The log, or the folder of a home's logs.
@@ -526,7 +526,7 @@ class Replay(Behavior, LogKeys):
     def decide(self, now: Situation) -> Plan:
         """Follow the log to its end, from the present step.
 
-        After another behavior's turn, the body first walks to where the log has it; in a log of
+        After another behavior's turn, the body first walks to its place in the log; in a log of
         positions, it is put there.
         """
         plan = now.plan()
@@ -556,7 +556,7 @@ class Replay(Behavior, LogKeys):
         self.visits = logged.visits
         follower = RoomFollower(actor, self.visits, self.gaps == "walk")
         self.follower: RoomFollower | FixFollower = follower
-        # Planned once before the run, for the report on its walks.
+        # A plan before the run serves for the report on its walks.
         follower.follow(Plan(actor, 0), 0, rejoin=False)
         self.notes = report_rooms(log, mapped, logged, follower)
 
@@ -567,7 +567,7 @@ class Replay(Behavior, LogKeys):
         frame = self.frame.in_unit(log.unit_m)
         time_us = log.time_us - begin_us
         step = time_us // clock.step_us
-        # The first fix of each step of the run.
+        # Only the first fix of each step is kept.
         is_first = np.append(True, step[1:] != step[:-1])
         used = is_first & (time_us < clock.steps * clock.step_us)
         fixes = place_fixes(

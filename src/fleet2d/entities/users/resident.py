@@ -1,4 +1,4 @@
-"""Residents: people who do one activity after another, and where in the home they do it."""
+"""Residents: people who do one activity after another, and the places of these in the home."""
 
 import math
 from bisect import bisect_right
@@ -29,7 +29,7 @@ from fleet2d.runtime.events import EventKind
 
 T = TypeVar("T")
 
-# Distance between two spots, at which bodies of the usual radius of 0.2 m don't touch [m].
+# Bodies of the usual radius of 0.2 m on two spots this far apart don't touch [m].
 SPACING = 0.6
 # Maximum number of spots of a room that a body uses.
 MAX_SPOTS = 8
@@ -42,7 +42,7 @@ class Spot(NamedTuple):
     y: int
 
     def walk(self, plan: "Plan") -> None:
-        """Go there."""
+        """Walk to the spot."""
         if plan.away or plan.position != (self.x, self.y):
             plan.go_to_point(self.x, self.y)
 
@@ -69,8 +69,8 @@ class Spots:
     Attributes:
         rank: The number of the body among the members of its household.
         members: The number of members.
-        apart: Whether who gets no place at furniture of its own has none, but in a bathroom: then
-            a spot of the room serves. Members of a household take turns instead.
+        apart: Whether a body without a place of its own at furniture uses a spot of the room,
+            except in a bathroom. Members of a household take turns instead.
     """
 
     def __init__(
@@ -82,14 +82,14 @@ class Spots:
         self._actor = actor
         self._of_room: dict[int, list[Spot]] = {}
         self._at_furniture: dict[Hashable, list[Seat]] = {}
-        self._version = -1  # of the home, when the spots were chosen
+        self._version = -1  # version of the home when the spots were chosen
 
     def __getstate__(self) -> dict[str, object]:
         """Leave out caches, which are computed again."""
         return {**self.__dict__, "_of_room": {}, "_at_furniture": {}}
 
     def reachable(self, rooms: list[Room]) -> list[Room]:
-        """Return those of some rooms that the body can get to at present: doors may be locked."""
+        """Return the rooms that the body can reach at present, as doors may be locked."""
         actor = self._actor
         if not actor.home.may_block_routes:
             return rooms
@@ -122,7 +122,7 @@ class Spots:
         Args:
             activity: The activity.
             rooms: The rooms to look in.
-            share: Rank of the body, and number of bodies that share; None: as in its household.
+            share: Rank of the body, and number of sharing bodies; None: as in its household.
         """
         self._check_version()
         indices = frozenset(room.index for room in rooms)
@@ -178,8 +178,8 @@ def seats_at(
 ) -> list[Seat]:
     """Return the places for an activity at the furniture in some rooms.
 
-    Its types of furniture are tried in turn until there are as many places as bodies. Of a piece
-    that has places for its posture, only those are used.
+    The activity's types of furniture are tried in turn until there are as many places as bodies. If
+    a piece has places for the activity's posture, only those are used.
 
     Args:
         home: The home.
@@ -206,30 +206,29 @@ def part_of(things: Sequence[T], rank: int, members: int) -> Sequence[T]:
     return things[rank % members :: members] or [things[rank % len(things)]]
 
 
-# How the core numbers ways of choosing rooms, small moves, and events.
+# The core numbers ways of choosing rooms, small moves and events in these orders.
 POLICIES = tuple(policy.name.lower() for policy in kernels.RoomPolicy)
 MOVE_KINDS = tuple(kind.name.lower() for kind in kernels.MoveKind)
 EVENTS = tuple(EventKind[event.name] for event in kernels.Happening)
 
 
-@lru_cache(512)  # most are the same for all people
+@lru_cache(512)  # most people share them
 def exponential_waits(mean_s: int) -> kernels.Waits:
     """Return random times between two moves, of a mean [s]."""
     return kernels.Waits(np.array(exponential(mean_s).knots, np.int64) * SECOND_US)
 
 
 class Venue(NamedTuple):
-    """Where and how a body does an activity in its home.
+    """The places and small moves of a body's activity in its home.
 
     Attributes:
         activity: The activity.
-        rooms: The rooms where it is done; none if it is done out of the home.
-        seats: The places at furniture where it is done; none: anywhere in the rooms.
+        rooms: The rooms of the activity; empty if it is done out of the home.
+        seats: The places at furniture; empty: anywhere in the rooms.
         stores: The rooms from which the body fetches things.
         small_moves: The small moves within the activity, in the order of MOVE_KINDS: the kind,
             and the mean time between two of each [s].
-        fetch_takes: The distribution of how long the body is away to fetch something [s], if it
-            does.
+        fetch_takes: The distribution of the time to fetch something [s], if the body does.
     """
 
     activity: Activity
@@ -250,7 +249,7 @@ class KnownHome:
     """The home as one person knows it.
 
     The core asks for spots, places at furniture and ways when it needs them, and keeps the answers
-    as long as doors and furniture stay as they are.
+    until doors or furniture change.
     """
 
     def __init__(self, person: "ResidentBehavior", actor: Actor) -> None:
@@ -258,13 +257,13 @@ class KnownHome:
         self._actor = actor
         self._last = kernels.LastStint()
         # The number of each place and of each activity's name, in the order of their first use.
-        self._seats: dict[Seat, int] = {}  # `_last` refers to them
+        self._seats: dict[Seat, int] = {}  # `_last` refers to these numbers
         self._names: dict[str, int] = {}
         self._core_venues: dict[Hashable, CoreVenue] = {}
         self._resident: tuple[object, Resident | None] = None, None
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave out caches, which are made again."""
+        """Leave out caches, which are computed again."""
         return {**self.__dict__, "_core_venues": {}, "_resident": (None, None)}
 
     def live(self, plan: Plan, stints: Sequence[Stint], until_us: int, *, continues: bool) -> None:
@@ -273,8 +272,8 @@ class KnownHome:
         Args:
             plan: The plan.
             stints: The activities.
-            until_us: None begins then, or later [us since the start].
-            continues: Whether the first one may be a part of the last one of the plan before.
+            until_us: The time before which all of them begin [us since the start].
+            continues: Whether the first one may continue the last one of the plan before.
         """
         live = self.update().live
         walk = partial(self._walk, plan)
@@ -307,7 +306,7 @@ class KnownHome:
         return resident
 
     def in_core(self, name: str, venue: Venue) -> CoreVenue:
-        """Return the venue of an activity as the core needs it, after an `update`."""
+        """Return the venue of an activity in the form of the core, after an `update`."""
         key: Hashable = name
         if venue is not self._person.venues.get(name):
             rooms = tuple(room.index for room in venue.rooms)
@@ -317,7 +316,7 @@ class KnownHome:
             self._core_venues[key] = self._make_core_venue(name, venue)
         return self._core_venues[key]
 
-    # What the core asks for.
+    # Callbacks of the core
 
     def spots(self, room: int) -> Sequence[Spot]:
         """Return the points of a room where the body stands."""
@@ -347,14 +346,14 @@ class KnownHome:
         return -1 if room is None else room.index
 
     def wait(self, room: int, now_us: int, takes_us: int) -> int | None:
-        """Return how long to wait before the body may use a room [us]; None: not now."""
+        """Return the time to wait before the body may use a room [us]; None: not now."""
         return self._person.wait_for(room, self._actor.clock, now_us, takes_us)
 
     def way_out(self) -> LatticePoint:
         """Return the lattice point where the body leaves the home."""
         return self._actor.way_out
 
-    # What is prepared for it, and taken from it.
+    # Arguments and results of the core
 
     def _make_core_venue(self, name: str, venue: Venue) -> CoreVenue:
         activity = venue.activity
@@ -386,14 +385,14 @@ class KnownHome:
         return _end_of(plan)
 
     def _take(self, plan: Plan, course: Course) -> None:
-        """Let a plan go on with what the core added to it."""
+        """Let a plan take over the core's additions."""
         end, posture, postures, notes = course
         plan.end = end
         plan.posture = POSTURES[posture]
         plan.postures += postures
         names = list(self._names)
         things = [seat.thing for seat in self._seats]
-        details = names, names, things, [""], [""]  # by event
+        details = names, names, things, [""], [""]  # details by event
         plan.notes += [
             new_note((time_us, EVENTS[what], details[what][number]))
             for time_us, what, number in notes
@@ -408,7 +407,7 @@ def _end_of(plan: Plan) -> tuple[PlanEnd, int]:
 # fewer episodes than half of it: the core adds the other half for the part of one after midnight.
 EPISODES_PER_DAY = 1024
 
-# How far ahead people plan who may be interrupted by robots at any time.
+# People whom robots may interrupt at any time plan this far ahead.
 AHEAD_US = 1800 * SECOND_US
 
 
@@ -416,9 +415,9 @@ class ResidentBehavior(Behavior):
     """Base of behaviors that do activities: a subclass implements `day`, the episodes of a day.
 
     Attributes:
-        small_moves: Whether it turns, gets up and fetches things within an activity.
-        own_places: Whether it keeps to spots and seats of its own, apart from all other users of
-            whom this holds; members of a household have such anyway.
+        small_moves: Whether the person turns, gets up and fetches things within an activity.
+        own_places: Whether the person keeps to spots and seats of its own, apart from all other
+            users with this key; members of a household have such anyway.
     """
 
     always_decides = True
@@ -427,7 +426,7 @@ class ResidentBehavior(Behavior):
     own_places: bool = False
 
     def day(self, ordinal: int) -> Sequence[Episode]:
-        """Return what the resident does on a day, given by its ordinal, until the next begins."""
+        """Return the episodes of a day, given by its ordinal, until the next begins."""
         raise NotImplementedError
 
     def wait_for(self, room: int, clock: Clock, begin_us: int, takes_us: int) -> int | None:
@@ -449,15 +448,14 @@ class ResidentBehavior(Behavior):
         sleeps_in: int | None = None,
         side: tuple[int, int] = (0, 1),
     ) -> None:
-        """Find where each activity is done in the home.
+        """Find the venue of each activity in the home.
 
         Args:
             actor: The body.
             activities: The activities that its days may have, by name.
-            spots: The spots where it may stand.
-            sleeps_in: The number of the bedroom that it sleeps in, modulo how many there are;
-                None: one drawn for the whole run.
-            side: Its rank among those who sleep in its bed, and their number.
+            spots: The spots of the body.
+            sleeps_in: The number of its bedroom, modulo their count; None: drawn once for the run.
+            side: Its rank among the people who sleep in its bed, and their number.
 
         Raises:
             PlacementError: The home has none of an activity's rooms.
@@ -466,13 +464,13 @@ class ResidentBehavior(Behavior):
         self.clock = actor.clock
         self.spots = spots
         self.known_home = KnownHome(self, actor)
-        self.planned_until = -1  # the step up to which the last plan goes
-        self.given_up: tuple[int, int] | None = None  # the episode that is not to be continued
+        self.planned_until = -1  # end of the last plan
+        self.given_up: tuple[int, int] | None = None  # an episode not to be continued
         self.reachable_rooms = actor.reachable_rooms()
         venues = activities.items()
         self.venues = {name: self._venue(actor, activity) for name, activity in venues}
         for name, venue in self.venues.items():
-            if not (venue.rooms or venue.activity.away):  # rest replaces it
+            if not (venue.rooms or venue.activity.away):  # rest replaces this activity
                 rooms = " or ".join(venue.activity.rooms)
                 note = f"activities.{name}.rooms: left out, because this home has no {rooms}"
                 actor.notes.append(note)
@@ -483,7 +481,7 @@ class ResidentBehavior(Behavior):
             self.venues[SLEEP] = self._bed(actor, activities[SLEEP], sleeps_in, side)
 
     def activities(self) -> tuple[str, ...]:
-        """Return the activities of its persona."""
+        """Return the names of the persona's activities."""
         return tuple(self.venues)
 
     def perform(self, plan: Plan, activity: str) -> None:
@@ -505,7 +503,7 @@ class ResidentBehavior(Behavior):
         """
         plan = now.plan()
         clock = now.actor.clock
-        self.is_hindered = now.home.may_block_routes  # by shut doors, for all of the plan
+        self.is_hindered = now.home.may_block_routes  # shut doors may hinder the whole plan
         midnight_us = clock.elapsed(next_midnight(now.time))
         last_us = midnight_us
         if now.actor.attention:
@@ -523,7 +521,7 @@ class ResidentBehavior(Behavior):
         return plan
 
     def furniture(self, actor: Actor, kind: str) -> str | None:
-        """Return the name of a piece of furniture of a kind that it uses, its bed before others."""
+        """Return the name of a used piece of furniture of a kind, the own bed before others."""
         sleeps = [self.venues[SLEEP]] if SLEEP in self.venues else []
         for venue in (*sleeps, *self.venues.values()):
             for seat in venue.seats:
@@ -554,11 +552,11 @@ class ResidentBehavior(Behavior):
             ordinal += 1
 
     def _end_us(self, ordinal: int, episode: Episode) -> int:
-        """Return when an episode of a day is over [us since the start]."""
+        """Return the end of an episode of a day [us since the start]."""
         return self.clock.reading(ordinal, episode.end)
 
     def _stint(self, episode: Episode, which: tuple[int, int], end_us: int) -> Stint:
-        """Return an episode as the core needs it; `which` is the address of its random draws."""
+        """Return an episode in the form of the core; `which` is the address of its random draws."""
         if which == self.given_up:
             episode = episode._replace(activity=REST)
         activity, begin, end, _, room, role = episode
@@ -572,24 +570,24 @@ class ResidentBehavior(Behavior):
         return core_venue, ordinal * EPISODES_PER_DAY + number, end_us, role, stays
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
-        """Return the venue with only the places at furniture that it has for the episode."""
+        """Return the venue with only the person's places at furniture for the episode."""
         return venue
 
     def makes_room(self, which: tuple[int, int]) -> bool:
-        """Return whether it leaves the room before a short rest, as others may want to use it."""
+        """Return whether the person leaves the room before a short rest, as others may need it."""
         return False
 
     def _at_present(self, venue: Venue) -> Venue:
         """Return the venue of an activity, without the rooms that shut doors block at present."""
         rooms = self.spots.reachable(venue.rooms)
-        if rooms is venue.rooms:  # no door is shut
+        if rooms is venue.rooms:  # no shut door blocks any
             return venue
         if len(rooms) < len(venue.rooms):
             venue = self._within(venue, rooms)
         return venue._replace(stores=self.spots.reachable(venue.stores))
 
     def _in_room(self, venue: Venue, index: int) -> Venue:
-        """Return the present venue of an activity; in a room that its household chose, if any."""
+        """Return the present venue of an activity, in a room chosen by the household, if any."""
         if index != ANY_ROOM:
             room = next((room for room in self.reachable_rooms if room.index == index), None)
             venue = venue if room is None else self._within(venue, [room])
@@ -622,7 +620,7 @@ class ResidentBehavior(Behavior):
         return Venue(activity, rooms, seats, stores, tuple(moves), activity.fetch_takes.table())
 
     def _bed(self, actor: Actor, sleep: Activity, sleeps_in: int, side: tuple[int, int]) -> Venue:
-        """Return the venue of sleep for a member of a household, whose bed it may share."""
+        """Return the venue of sleep for a member of a household, maybe in a shared bed."""
         rooms = _match(actor, sleep)[1]
         room = rooms[sleeps_in % len(rooms)]
         seats = self.spots.at_furniture(sleep, [room], side)
@@ -630,7 +628,7 @@ class ResidentBehavior(Behavior):
 
     @staticmethod
     def _own_rooms(actor: Actor, activity: Activity) -> list[Room]:
-        """Return the rooms of the first name that matches: of several of a kind, one for good."""
+        """Return the rooms of the first name that matches; of several of a kind, one for good."""
         name, rooms = _match(actor, activity)
         if name == "any" or not rooms:
             return rooms
@@ -647,10 +645,10 @@ def _match(actor: Actor, activity: Activity) -> tuple[str, list[Room]]:
 
 
 def rooms_for(activity: Activity, home: Home, reachable: list[Room]) -> tuple[str, list[Room]]:
-    """Return the first of the names of an activity's rooms that fits, and all rooms that it means.
+    """Return the first fitting name of an activity's rooms, and all rooms of that name.
 
-    Rooms with furniture for the activity come before others: first those that it names, then any,
-    but for chairs, which stand at the desks of bedrooms, too.
+    Rooms with furniture for the activity come before others: first named rooms, then any, but not
+    for chairs, which also stand at desks in bedrooms.
 
     Args:
         activity: The activity.
@@ -670,7 +668,7 @@ def rooms_for(activity: Activity, home: Home, reachable: list[Room]) -> tuple[st
                 kinds.discard("chair")
             things = (thing for thing in home.objects if thing.type in kinds and thing.uses)
             used = {home.room_of(thing) for thing in things}
-            with suppress(PlacementError):  # it has no such room
+            with suppress(PlacementError):  # the home has no such room
                 furnished = [room for room in match((name,))[1] if room in used]
                 if furnished:
                     return name, furnished
@@ -680,7 +678,7 @@ def rooms_for(activity: Activity, home: Home, reachable: list[Room]) -> tuple[st
 def rooms_at(
     episodes: Iterable[Episode], time_s: int, activities: dict[str, Activity]
 ) -> RoomChoice:
-    """Return the rooms of the episode at a time; () if that is out of the home."""
+    """Return the rooms of the episode at a time; () if it is out of the home."""
     for episode in episodes:
         if episode.begin <= time_s < episode.end:
             activity = activities[episode.activity]

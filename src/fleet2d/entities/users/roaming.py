@@ -20,11 +20,11 @@ from fleet2d.runtime.clock import SECOND_US
 from fleet2d.runtime.determinism import Draws, sum_in_order
 
 AWAY = "away"
-# How many visits are planned at once.
+# This many visits are planned at once.
 VISITS = 20
-# The minimum length of a stay after subtracting the time of travel.
+# The minimum length of a stay after subtracting the time of travel [us].
 SHORTEST_US = 10 * SECOND_US
-# Points per metre of a way at which the room is looked up.
+# The room is looked up at this many points per metre of a way.
 POINTS_PER_M = 10
 
 
@@ -38,9 +38,8 @@ class RoomSampling(Behavior):
     other rooms is not compensated.
 
     Attributes:
-        shares: How much of the time is spent in each room or kind of room, or 'away'; relative to
-            each other.
-        dwell: How long a visit takes.
+        shares: Relative shares of the time in each room or kind of room, or 'away'.
+        dwell: Duration of a visit.
     """
 
     always_decides = True
@@ -76,7 +75,7 @@ class RoomSampling(Behavior):
             rooms = [None] if name == AWAY else [room.index for room in actor.rooms((name,))]
             for index in rooms:
                 chances[index] = chances.get(index, 0.0) + share / total / len(rooms)
-        # By the room's index, None is out of the home [per million].
+        # Shares by the room's index, None for out of the home [per million].
         self.chances = {index: round(chance * MILLION) for index, chance in chances.items()}
         self.dwell_time = self.dwell.table()
         self.spots = Spots(actor)
@@ -148,7 +147,7 @@ def _rooms_along(actor: Actor, route: I64) -> list[tuple[int, float]]:
 
 # Probability that the next spot is in the same room.
 STAYS_IN_ROOM = 0.6
-# How many naps are planned at once.
+# This many naps are planned at once.
 NAPS = 10
 
 
@@ -160,8 +159,8 @@ class Pet(Behavior):
 
     Attributes:
         rooms: Rooms and kinds of rooms that it may enter; none: all.
-        nap: How long it sleeps at a time.
-        stop: How long it stops at a spot while it roams.
+        nap: Duration of a nap.
+        stop: Duration of a stop at a spot.
         spots: Smallest and largest number of stops between two naps.
     """
 
@@ -184,7 +183,7 @@ class Pet(Behavior):
             raise problem(f"spots: expected [least, most] like [3, 12], got {list(self.spots)}")
 
     def start(self, actor: Actor) -> None:
-        """Find the rooms that it may enter."""
+        """Find the rooms that the pet may enter."""
         rooms = available_rooms(actor, "pet.rooms", self.rooms)
         self.allowed_rooms = rooms or actor.reachable_rooms()
         self.places = Spots(actor)

@@ -27,7 +27,7 @@ from fleet2d.runtime.clock import DAY_S, SECOND_US, Clock, midnight_of
 from fleet2d.runtime.determinism import Draws, stream_key
 from fleet2d.runtime.local_time import written
 
-# All members must get the same rooms, whatever their radius: those of a body of this radius [m].
+# Rooms must be the same for all members, so they are computed for this radius [m].
 DEFAULT_RADIUS = 0.2
 
 
@@ -79,7 +79,7 @@ def _rooms_of(activity: Activity, home: Home, reachable: list[Room]) -> list[Roo
     return list(dict.fromkeys(found))
 
 
-# Bodies of the usual radius that are nearer to each other touch [m].
+# Bodies of the usual radius nearer to each other than this touch [m].
 TOUCHING_M = 2 * DEFAULT_RADIUS
 
 Places = Mapping[tuple[int, int], Seat | None]
@@ -90,13 +90,13 @@ class SeatClaim(NamedTuple):
     """A time in which a member wants a place at furniture.
 
     Attributes:
-        is_asleep: Whether the member sleeps there, which has precedence.
-        begin: Its beginning [s since the midnight of ordinal 0].
+        is_asleep: Whether the member sleeps there, which takes precedence.
+        begin: The beginning [s since the midnight of ordinal 0].
         rank: The number of the member.
-        end: Its end.
-        episodes: The numbers of the episodes of the day that it is for.
-        seats: The places that the member may have, those of its own first.
-        own: The number of its own places, one of which it prefers.
+        end: The end [s since the midnight of ordinal 0].
+        episodes: The numbers of its episodes of the day.
+        seats: The possible places, the member's own first.
+        own: The number of own places, which are preferred.
     """
 
     is_asleep: bool
@@ -109,18 +109,18 @@ class SeatClaim(NamedTuple):
 
     @property
     def precedence(self) -> tuple[bool, int, int]:
-        """By what claims are sorted: the first one has its place."""
+        """The sort key of claims: the first one gets its place."""
         return not self.is_asleep, self.begin, self.rank
 
 
 class Seating:
     """The places at furniture that members of a household have on each day.
 
-    Who comes first has a place until the end of what they do there, interruptions included; who
-    comes later has another place of that furniture or of another piece, or none: then it is done on
-    a spot in the room. Of those who come at once, the first member of the household is first.
-    Sleepers come before all others of their day. All members compute the same from the plans of the
-    household, so that none has to know where the others are.
+    The member who comes first has a place until the end of the activity, interruptions included;
+    later ones get another place of that furniture or of another piece, or else a spot in the room.
+    Of members who come at once, the first in the household is first. Sleepers come before all
+    others of their day. All members compute the same result from the plans of the household, so
+    that none has to know where the others are.
     """
 
     def __init__(self, actor: Actor, lives: Lives) -> None:
@@ -134,12 +134,12 @@ class Seating:
         self._seed = actor.seed
         self._keys = {i: stream_key(self._seed, p, "seat") for i, p in self._paths.items()}
         self._count = len(names)
-        self._objects: object = None  # the furniture that the places are of
+        self._objects: object = None  # the furniture of the places
 
     def _restart(self) -> None:
         self._next = self._lives.first
         self._days: dict[int, Places] = {}
-        self._taken: dict[Seat, list[tuple[int, int]]] = {}  # by the first place of a spot
+        self._taken: dict[Seat, list[tuple[int, int]]] = {}  # times by the first place of a spot
         self._wanted: dict[tuple[int, str], tuple[Sequence[Seat], int]] = {}
         self._spot = _spots(self._home.objects)
         self._reachable = usual_rooms(self._home)
@@ -153,7 +153,7 @@ class Seating:
             rank: The number of the member.
 
         Returns:
-            The place; nothing if others have all places; None if it isn't shared with others.
+            The place; empty if others have all places; None if places aren't shared.
         """
         if self._objects is not self._home.objects:
             self._objects = self._home.objects
@@ -208,7 +208,7 @@ class Seating:
                     yield SeatClaim(is_asleep, begin, rank, end, tuple(numbers), seats, own)
 
     def _wanted_by(self, rank: int, episode: Episode) -> tuple[Sequence[Seat], int]:
-        """Return the places that a member may have for an episode, and how many are its own."""
+        """Return the possible places of a member for an episode, and the number of its own."""
         if episode.room != ANY_ROOM:
             return (), 0
         key = rank, episode.activity
@@ -233,16 +233,16 @@ class Seating:
         return (*own, *(seat for seat in seats if seat not in own)), len(own)
 
     def _seats(self, activity: Activity, rooms: frozenset[int], wanted: int) -> Sequence[Seat]:
-        """Return the places for an activity in some rooms, of those at one spot the first."""
+        """Return the places for an activity in some rooms, only the first of those at one spot."""
         seats = resident.seats_at(self._home, activity, rooms, wanted)
         first_at_spot = {self._spot[seat]: seat for seat in reversed(seats)}
         return list(first_at_spot.values())[::-1]
 
     def _rooms(self, rank: int, activity: Activity, bedroom: int | None) -> Sequence[Room]:
-        """Return the rooms of an activity, as `ResidentBehavior` chooses them for this member."""
+        """Return the rooms that `ResidentBehavior` chooses for a member's activity."""
         try:
             name, rooms = resident.rooms_for(activity, self._home, self._reachable)
-        except PlacementError:  # then rest replaces the activity
+        except PlacementError:  # rest replaces the activity
             return ()
         if bedroom is not None:
             return (rooms[bedroom % len(rooms)],)
@@ -253,7 +253,7 @@ class Seating:
 
 
 def _spots(objects: Sequence[PlacedObject]) -> dict[Seat, Seat]:
-    """Return the first of the places at which bodies would touch, as of a table and its chairs."""
+    """Map each place to the first one at which bodies would touch, as at a table and its chairs."""
     points: dict[Seat, Point] = {}
     spots = {}
     for thing in objects:
@@ -284,7 +284,7 @@ def _stays(episodes: Sequence[Episode], is_out: Callable[[Episode], bool]) -> li
     return groups
 
 
-# Length of a time slot in which one member of a household may go to a private room.
+# The time slot in which one member of a household may go to a private room.
 TURN_US = 900 * SECOND_US
 # A way there takes less than this.
 WAY_US = 60 * SECOND_US
@@ -300,10 +300,9 @@ class Routine(ResidentBehavior):
     Attributes:
         persona: The persona: a bundled name, a YAML file, or a mapping that may extend either; left
             out: works_outside.
-        household: The household it belongs to: a mapping or a YAML file, the same for all of its
-            members.
-        away: When it is out of the home, on holiday.
-        visits: When it is in the home, if it is only a visitor, as far as its persona is.
+        household: The person's household: a mapping or a YAML file, the same for all members.
+        away: Holidays, out of the home.
+        visits: The times of presence of a visitor, as far as its persona allows them.
     """
 
     persona: AnyPersona | None = None
@@ -327,7 +326,7 @@ class Routine(ResidentBehavior):
             raise problem("members of a household have places of their own: leave out own_places")
 
     def start(self, actor: Actor) -> None:
-        """Set up the days of the person, and find where the activities are done in the home."""
+        """Set up the days of the person, and find the venues of the activities."""
         self.name = actor.name
         sleeps_in = None
         side = (0, 1)
@@ -358,7 +357,7 @@ class Routine(ResidentBehavior):
             for behavior in getattr(body, "behaviors", ())
             if body is not actor and isinstance(behavior, Routine) and behavior.household is None
         )
-        others = list(islice(strangers, 2))  # of a thousand, too
+        others = list(islice(strangers, 2))  # two are enough, even of a thousand
         if len(others) == 1 and not self.own_places:
             members = f"{others[0]}: works_outside, {actor.name}: works_outside"
             actor.notes.append(
@@ -369,7 +368,7 @@ class Routine(ResidentBehavior):
             )
 
     def _join_household(self, actor: Actor) -> None:
-        """Share the days and places of the members, or prepare them if it is the first of them."""
+        """Share the days and places of the members, after preparing them for the first member."""
         assert self.household is not None
         others = (actor.people.get(name) for name in self.household.members)
         behaviors = (each for body in others for each in getattr(body, "behaviors", ()))
@@ -385,7 +384,7 @@ class Routine(ResidentBehavior):
 
     @property
     def resolved_persona(self) -> Persona:
-        """The persona, of its own or of the household's member."""
+        """The persona: the own one, or that of the household's member."""
         if self.household is not None:
             members = self.household.members
             return members[getattr(self, "name", next(iter(members)))]
@@ -400,7 +399,7 @@ class Routine(ResidentBehavior):
         return used
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | None:
-        """Return the rooms of a likely activity at that time."""
+        """Return the rooms of a likely activity at a time."""
         likely_day = Life(self.resolved_persona, 0, "").day
         today = time.toordinal()
         time_s = (written(time) - midnight_of(time)) // timedelta(seconds=1)
@@ -411,7 +410,7 @@ class Routine(ResidentBehavior):
         return resident.rooms_at(day, time_s, self._activities())
 
     def day(self, ordinal: int) -> Sequence[Episode]:
-        """Return what is done on the day of a date's ordinal."""
+        """Return the episodes on the day of a date's ordinal."""
         if self.household is None:
             return self._with_absences(self.life.day(ordinal), ordinal)
         return self.lives.day(ordinal)[self.name]
@@ -436,7 +435,7 @@ class Routine(ResidentBehavior):
         if ends_us - begins_us > TURN_US:
             return None
         date = clock.start + timedelta(microseconds=begins_us)
-        midnight_us = begins_us - micros(written(date) - midnight_of(date))  # by the present offset
+        midnight_us = begins_us - micros(written(date) - midnight_of(date))  # present offset
         first = (begins_us - WAY_US - midnight_us) // SECOND_US
         last = -((midnight_us - ends_us) // SECOND_US)  # rounded up
         if self.lives.in_use(date.toordinal(), self.name, room, first, last):
@@ -444,7 +443,7 @@ class Routine(ResidentBehavior):
         return begins_us - begin_us
 
     def seated(self, venue: Venue, which: tuple[int, int]) -> Venue:
-        """Return the venue with the place that the member of a household has for the episode."""
+        """Return the venue with the household member's place for the episode."""
         if self.household is None or not venue.seats:
             return venue
         places = self.seating.places(*which, self.spots.rank)
@@ -453,7 +452,7 @@ class Routine(ResidentBehavior):
         return venue._replace(seats=list(places))
 
     def makes_room(self, which: tuple[int, int]) -> bool:
-        """Return whether members of its household may want to use the bathroom that it was in."""
+        """Return whether other members of the household may need the bathroom."""
         ordinal, number = which
         if self.household is None or number == 0:
             return False

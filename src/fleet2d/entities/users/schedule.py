@@ -20,14 +20,14 @@ AWAY: tuple[()] = ()
 
 
 class Item(Settings):
-    """One entry of an agenda: when, where, and for how long.
+    """An entry of an agenda: its time, place and duration.
 
     Attributes:
-        at: When it begins; left out: when the item before is over.
+        at: The beginning; left out: the end of the item before.
         place: The place: a room, a kind of room, or a point.
-        away: Whether it is out of the home instead of at a place.
-        dwell: How long it takes; left out: until the next item begins.
-        activity: The activity that is done there, for the events table.
+        away: Whether the person is out of the home instead.
+        dwell: The duration; left out: until the next item begins.
+        activity: The activity there, for the events table.
     """
 
     at: TimeOfDay | None = None
@@ -37,7 +37,7 @@ class Item(Settings):
     activity: str = ""
 
     def model_post_init(self, _: object, /) -> None:
-        """Require a place, or to be away."""
+        """Require either a place or `away`."""
         if self.away == (self.place is not None):
             raise problem("an item needs a place, or 'away: true', and not both")
 
@@ -55,7 +55,7 @@ class Agenda(Settings):
 
     @property
     def weekdays(self) -> set[int]:
-        """The days of the week it applies to, 0 = Monday."""
+        """The days of the week that the agenda applies to, 0 = Monday."""
         return weekdays_of(self.on)
 
 
@@ -63,10 +63,10 @@ class AgendaEntry(NamedTuple):
     """A resolved item of an agenda.
 
     Attributes:
-        at: The time of day of its own, or of the last item before it that has one.
-        later: The dwells from then until it begins, in real time.
-        place: Where it is; () is out of the home.
-        activity: What is done there.
+        at: The time of day of the item, or of the last item before it with one.
+        later: The dwells from then until the beginning, in real time.
+        place: The place; () is out of the home.
+        activity: The activity there.
     """
 
     at: timedelta
@@ -76,11 +76,11 @@ class AgendaEntry(NamedTuple):
 
     @property
     def begins(self) -> timedelta:
-        """When it begins since midnight, on a day of 24 hours; a rest may on a later day."""
+        """The beginning since midnight on a day of 24 hours; for a rest, maybe on a later day."""
         return self.at + self.later
 
     def moment(self, midnight: datetime, time: datetime) -> datetime:
-        """Return when it begins on the day of a midnight, by the clock of a time."""
+        """Return the beginning on the day of a midnight, by the clock of a time."""
         return at_reading(time, midnight + self.at) + self.later
 
 
@@ -88,12 +88,13 @@ class Schedule(Behavior):
     """Be at fixed places at fixed times, daily or by weekday.
 
     At an item's time the body walks to its place by the shortest path; in a room, to a spot drawn
-    each time. When an item with a dwell is over and no other is due, it goes to the place `rest`,
-    also on a later day. A later day of the list replaces an earlier one on the weekdays they share.
+    each time. When an item with a dwell is over and no other is due, the body goes to the place
+    `rest`, even on a later day. A later day of the list replaces an earlier one on the weekdays
+    they share.
 
     Attributes:
         days: The agendas of the days of the week.
-        rest: Where it goes when an item is over and nothing is due.
+        rest: The place to go to when an item is over and nothing is due.
     """
 
     always_decides = True
@@ -116,8 +117,8 @@ class Schedule(Behavior):
     def start(self, actor: Actor) -> None:
         """Resolve the week, and check that every place exists and can be reached."""
         self.week = self._week()
-        self.plan: Plan | None = None  # the last one that it returned
-        self.until = actor.clock.start  # the midnight at which that plan ends
+        self.plan: Plan | None = None  # the last plan returned
+        self.until = actor.clock.start  # midnight at its end
         entries = chain.from_iterable(self.week)
         places = dict.fromkeys(entry.place for entry in entries if entry.place)
         for place in places:
@@ -136,7 +137,7 @@ class Schedule(Behavior):
         """Plan the rest of the day; after another behavior's turn, first go to the present item."""
         plan = now.plan()
         since = now.time
-        if now.actor.plan is self.plan:  # its own plan, which may end later than midnight
+        if now.actor.plan is self.plan:  # the own plan may end later than midnight
             since = self.until
         elif entry := self._current(self.week, now.time):
             seat = seat_at(now.actor, entry.place) if entry.place else None
@@ -147,7 +148,7 @@ class Schedule(Behavior):
             entries = self.week[midnight.weekday()]
             moments = [entry.moment(midnight, now.time) for entry in entries]
             for number, (entry, moment) in enumerate(zip(entries, moments, strict=True)):
-                # When clocks are put forward, what a dwell delays may be due after a later item.
+                # When clocks are put forward, an item after a dwell may be due after a later item.
                 is_overtaken = any(later < moment for later in moments[number + 1 :])
                 if moment >= since and not is_overtaken:
                     _add(plan.stay(until=moment), entry)
@@ -155,12 +156,12 @@ class Schedule(Behavior):
         return self.plan
 
     def activities(self) -> tuple[str, ...]:
-        """Return the activities of its agendas."""
+        """Return the activities of the agendas."""
         names = (entry.activity for entry in chain.from_iterable(self.week))
         return tuple(dict.fromkeys(filter(None, names)))
 
     def perform(self, plan: Plan, activity: str) -> None:
-        """Go to where an activity is done: the first place that an agenda has for it."""
+        """Go to the first place that an agenda has for an activity."""
         entries = chain.from_iterable(self.week)
         place = next(entry.place for entry in entries if entry.activity == activity)
         if place:
@@ -205,7 +206,7 @@ def _entries(day: Agenda, rest: RoomChoice | Point, number: int = 0) -> list[Age
             list of days.
     """
     entries: list[AgendaEntry] = []
-    over: AgendaEntry | None = None  # the rest after the item before, if that has a dwell
+    over: AgendaEntry | None = None  # rest after the item before, if it has a dwell
     for index, item in enumerate(day.items):
         key = ("days", number, "items", index)
         place = item.place or AWAY

@@ -1,4 +1,4 @@
-"""People moved by something else: guests of a script, people nobody located, programs."""
+"""People moved from outside: guests of a script, people without a known place, programs."""
 
 from collections.abc import Mapping
 from datetime import datetime, timedelta
@@ -38,8 +38,8 @@ class Guest(Behavior):
 class Unknown(Behavior):
     """Be somewhere that nobody recorded, while a real robot's detections are replayed.
 
-    In the simulation the person is away all the time, and nobody sees them; metrics leave out
-    what would need their place. Event: `unknown`.
+    In the simulation the person is away all the time and never seen; metrics leave out results that
+    need the person's place. Event: `unknown`.
     """
 
     records = frozenset({EventKind.UNKNOWN})
@@ -55,10 +55,10 @@ class Unknown(Behavior):
 
 
 class Live(Behavior):
-    """Be where a real person or robot is, or go where another program says: see `fleet2d live`.
+    """Take the poses of a real person or robot, or goals from a program: see `fleet2d live`.
 
-    What arrives is an intervention: `put` for a pose, `send` for a goal. Until something arrives,
-    and when nothing does any more, the body stands.
+    Messages become interventions: `put` for a pose, `send` for a goal. Without any, the body
+    stands.
 
     Attributes:
         source: The other program whose messages it takes, such as ws://127.0.0.1:8765, which
@@ -75,14 +75,14 @@ class Live(Behavior):
 
 
 class _SentGoal(NamedTuple):
-    """Where a program sent a body: as it said it, the point, or why no way leads there."""
+    """The goal to which a program sent a body: its text, the point, or the reason for no way."""
 
     to: Any
     point: LatticePoint | None
     reason: str
 
     def outcome(self, body: Pose) -> dict[str, Any]:
-        """Return what became of it, once the body has to decide anew."""
+        """Return the outcome, once the body has to decide again."""
         if self.point == (body.x, body.y):
             return {"go_to": self.to, "state": "reached", "detail": ""}
         if self.point is None:
@@ -94,16 +94,15 @@ class _SentGoal(NamedTuple):
 class ProcessBehavior(Behavior):
     """A behavior in another process, of any language.
 
-    Whenever the body has to decide, the program is told where it is and what became of the last
-    place that it was sent to, and answers with a plan, a list of `{go_to: PLACE}`,
-    `{turn_deg: 90}` and `{stay_s: 60}`; or with the type `none`: then the next behavior decides.
-    Where no way leads, as a door is shut, the body waits before the program is asked again. See
-    `fleet2d.runtime.program` for the messages.
+    Whenever the body has to decide, the program is told its pose and the outcome of its last goal,
+    and answers with a plan, a list of `{go_to: PLACE}`, `{turn_deg: 90}` and `{stay_s: 60}`; or
+    with the type `none`: then the next behavior decides. Where no way leads, as a door is shut, the
+    body waits before the program is asked again. See `fleet2d.runtime.program` for the messages.
 
     Attributes:
         command: The program; a file .py is run by Python, .js and .mjs by Node.
-        arguments: Its arguments.
-        settings: Its own settings, which it gets in the first message.
+        arguments: The arguments of the program.
+        settings: The program's own settings, sent in the first message.
         timeout: The longest time to wait for an answer; then the run fails.
     """
 
@@ -164,7 +163,7 @@ class ProcessBehavior(Behavior):
         return plan
 
     def _send(self, plan: Plan, place: Any) -> None:
-        """Let a plan go to a place, and keep what the program is to be told of it."""
+        """Let a plan go to a place, and keep the goal for the next message."""
         try:
             plan.go_to(place)
         except (PlacementError, NoWayError) as error:
