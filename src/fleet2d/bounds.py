@@ -21,7 +21,7 @@ class Bound:
     Attributes:
         name: The name of the environment variable that raises the bound, without `FLEET2D_MAX_`.
         default: The bound without that variable.
-        noun: What is counted, for messages.
+        noun: The counted things, for messages.
 
     Example:
         >>> Bound("DEPTH", 64, "lists in lists").check(100, "home.yaml")

@@ -113,7 +113,7 @@ def extra(name: str, need: str) -> Iterator[None]:
 
     Args:
         name: The extra of Fleet2D that has the package, such as study.
-        need: What needs which package.
+        need: The feature and the package that it needs.
 
     Raises:
         InputError: The package is not installed.

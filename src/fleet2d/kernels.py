@@ -221,7 +221,7 @@ def camera_poses(
 
 
 class Reach(NamedTuple):
-    """How far and how wide a camera sees."""
+    """The range and angle of a camera."""
 
     near_squared: int  # lattice units squared, below 2**52
     far_squared: int
@@ -352,7 +352,7 @@ class ShownMemory(NamedTuple):
 
 
 class PoseCache(NamedTuple):
-    """What cameras see at each pose: poses in order, and an open hash table of 2**n slots.
+    """The cells in view at each pose: poses in order, and an open hash table of 2**n slots.
 
     Attributes:
         number: int32 (slots,), number of the pose in each slot, -1 for an empty slot.
@@ -374,7 +374,7 @@ class PoseCache(NamedTuple):
 
 
 class CoverageRecord(NamedTuple):
-    """What a robot has seen since the start.
+    """The area that a robot has seen since the start.
 
     Attributes:
         first: int64 (rows, columns), first step at which each cell was in view, -1 for never;
@@ -462,7 +462,7 @@ class Poses(NamedTuple):
 
 
 class WalkRule(NamedTuple):
-    """How a meandering body moves in one step."""
+    """The motion of a meandering body in one step."""
 
     key: np.uint64  # of its random stream
     stride: int  # 1/256 lattice units forward

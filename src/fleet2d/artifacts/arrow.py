@@ -345,7 +345,7 @@ def read_row_groups(path: Path) -> Iterator[pa.Table]:
 
 
 def count_rows(path: Path) -> int:
-    """Return the number of rows that the file says it has.
+    """Return the number of rows in the metadata of a file.
 
     Raises:
         ArtifactError: The file is missing or cut off.

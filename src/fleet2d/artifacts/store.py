@@ -106,7 +106,7 @@ class TableWriter:
         digest: Digest of the rows in the file; None before the first, and for a run in memory.
         chunks: Those rows and the number in each chunk, if the run is in memory.
         file: The file with those rows, if the run is in a directory; None before the first.
-        logged: How many rows of the buffer are in the journal.
+        logged: Number of rows of the buffer that are in the journal.
     """
 
     buffer: TableBuffer

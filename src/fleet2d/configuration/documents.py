@@ -18,7 +18,7 @@ from fleet2d.errors import InputError, ScenarioError
 
 # All nodes of a shorter text fit into memory [characters].
 _SHORT = 1 << 20
-# libyaml recurses for each level of a text: so many levels don't overflow the stack.
+# libyaml recurses for each level of a text, and this many don't overflow the stack.
 _SHALLOW = 2000
 # PyYAML's own parser has better messages, but is too slow for a longer text [characters].
 _SLOW_TO_EXPLAIN = 100_000
@@ -284,7 +284,7 @@ class Document:
         return f"{place}: {path}" if place else path
 
     def place(self, location: Location) -> str:
-        """Return where a key is written, or the nearest key around it.
+        """Return the place of a key, or of the nearest key around it.
 
         For a mapping it also names the files and overrides that change it: an error about the
         mapping may be due to these.

@@ -36,7 +36,7 @@ _BESIDE: WeakKeyDictionary[type, Path] = WeakKeyDictionary()
 
 
 class BrokenModule(ScenarioError):
-    """A module whose import fails; ``cause`` says where and how."""
+    """A module whose import fails; ``cause`` describes the failure."""
 
     def __init__(self, name: str, cause: str) -> None:
         super().__init__(f"can't import {name!r}: {cause}")
@@ -170,7 +170,7 @@ def _no_class(module: ModuleType, qualname: str, folder: Path) -> str:
 
 
 def _failure(error: BaseException, folder: Path) -> str:
-    """Return where in the user's files an import failed, and how."""
+    """Describe the failure of an import, with the line in the user's files."""
     if isinstance(error, SyntaxError) and error.filename:
         file = _short_path(error.filename, folder)
         return f"{file}:{error.lineno}: {type(error).__name__}: {error.msg}"

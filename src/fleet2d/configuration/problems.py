@@ -143,7 +143,7 @@ def check_known(
 
     Args:
         name: The name.
-        noun: What it names.
+        noun: The kind of the named thing, such as "room".
         known: The known names.
         error: The error to raise.
         where: The beginning of its message.

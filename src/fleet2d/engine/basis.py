@@ -111,8 +111,6 @@ class Watcher:
         """
         return ()
 
-    # Decisions
-
     def looks(self, row: int, step: int) -> bool:
         """Return whether a steered body is asked for a decision at a step."""
         return False
@@ -129,8 +127,6 @@ class Watcher:
 
     def begin_plan(self, actor: DecidingActor) -> None:
         """React to the beginning of a body's plan."""
-
-    # Observations and outputs
 
     def settle(self, end: int, observations: SightingTable, readings: Sequence[SensorRow]) -> None:
         """Process observations up to step `end` - 1, in which the home doesn't change.
@@ -219,7 +215,7 @@ def input_files(scenario: Scenario) -> list[Path]:
 
 
 def components_of(scenario: Scenario) -> Iterator[Component]:
-    """Yield all components of a scenario, also those within others."""
+    """Yield all components of a scenario, including nested ones."""
     robots = scenario.robots.values()
     script = scenario.script
     errors = [robot.perception for robot in robots]

@@ -338,7 +338,7 @@ class Cameras(Watcher):
 
     @property
     def counts(self) -> I64:
-        """How often each camera had each user in view, and noticed them: (cameras, users, 2)."""
+        """Numbers of looks with a user in view, and noticed: (cameras, users, 2)."""
         return self.memory.about[..., [About.IN_VIEW.value, About.NOTICED.value]]
 
     @property
@@ -565,9 +565,6 @@ def newest_of(rows: I64, identities: int) -> list[int]:
     return newest.tolist()
 
 
-# Interventions
-
-
 def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemory:
     """Return the memory of cameras for other errors, with the content of the old memory.
 
@@ -587,9 +584,6 @@ def carry_over(memory: SightMemory, old: SightMemory, forced: I64) -> SightMemor
         backlog[c, : len(rows_of_old)] = old.backlog[c, rows_of_old]
         waiting[c, 1] = len(rows_of_old)
     return SightMemory(old.noticed, old.seen, about, backlog, waiting)
-
-
-# Methods of sight in Python
 
 
 def points_seen(

@@ -271,8 +271,6 @@ class ChangeQueue:
                 events += self._close_unused(due, step)
         return events
 
-    # Changes that are due
-
     def _make_change(self, due: DueChange, change: HomeChange, step: int) -> list[Event]:
         verb = change.verb
         target = change.target
@@ -351,8 +349,6 @@ class ChangeQueue:
         x, y = change.to
         return [Event(step, HOME, EventKind.MOVED, f"{new.name} to ({x:g}, {y:g})")]
 
-    # Bodies in the way
-
     def _door_shape(self, door: int) -> F64:
         return np.array(self.home.door_line(door), np.float64)
 
@@ -384,8 +380,6 @@ class ChangeQueue:
             return False
         door = next(d for d in range(len(self.names)) if np.array_equal(self._door_shape(d), shape))
         return door not in self.home.locked
-
-    # The queue
 
     def _put(self, due: DueChange) -> None:
         heapq.heappush(self._queue, (due.step, self._count, due))

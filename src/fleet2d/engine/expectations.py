@@ -141,8 +141,6 @@ class RunExpectations(Watcher):
             {name: partial(limits_of, metric) for name, metric in metrics},
         )
 
-    # Measuring
-
     def take_events(self, events: Sequence[Event]) -> None:
         """Collect events until `settle` measures their steps."""
         self._events += events
@@ -171,8 +169,6 @@ class RunExpectations(Watcher):
             gauge.take(block)
         self._run.first = end
         self._events = rest
-
-    # Judging
 
     def verdicts(self, *, ended: bool) -> dict[str, Verdict]:
         """Return the present verdicts on the expectations that have begun, by name.

@@ -74,7 +74,7 @@ class Interruptions(Watcher):
     def __init__(self, basis: Basis) -> None:
         self._actors = basis.actors
         self._users = basis.bodies.users
-        # This says whether the condition held at the last step; None: the plan has not begun yet.
+        # Values tell whether the condition held at the last step; None: the plan hasn't begun yet.
         self._held: dict[Wait, bool | None] = {}
         self._ahead: dict[Wait, Bool] = {}  # steps of the present span at which it holds
         self._last: list[Wait] = []

@@ -268,9 +268,6 @@ PHASES: tuple[Phase, ...] = (intervene, change_home, decide, move, watch, record
 AT_DECISIONS = PHASES.index(decide)
 
 
-# The loop
-
-
 class Loop:
     """Takes a run from span to span.
 
@@ -410,7 +407,7 @@ class Pace:
         self._began = time.perf_counter()
 
     def steps(self, step_us: int) -> int:
-        """Return how many steps may be simulated between two looks at the clock."""
+        """Return the number of steps that may be simulated between two looks at the clock."""
         return max(1, int(self.slice_s * 1e6 / step_us))
 
     def resume(self, simulated_s: float) -> None:

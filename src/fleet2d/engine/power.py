@@ -98,9 +98,6 @@ def follow_charge(queue: InterventionQueue, actor: DecidingActor, step: int) -> 
     queue.follow(act, step + 1, BY_BATTERY)
 
 
-# Random and dated failures
-
-
 def schedule_failures(state: State, scenario: Scenario, clock: Clock, seed: int) -> None:
     """Schedule crashes and updates of robots, and failures of cameras and sensors.
 

@@ -176,8 +176,6 @@ class Simulation:
         document = self.home.cached("document", lambda: json.dumps(native_document(plan)))
         self._store.keep(FLOORPLAN_NAME, document)
 
-    # State
-
     @property
     def step(self) -> int:
         """The next step to simulate; 0 at the start."""
@@ -346,8 +344,6 @@ class Simulation:
             "away": bool(state.away),
             **({"off": actor.off_for} if actor.is_off else {}),
         }
-
-    # Running
 
     def run(self, on_progress: Callable[[Self], None] | None = None) -> Run:
         """Simulate to the end, store, and return the run.
@@ -635,8 +631,6 @@ class Simulation:
             raise ScenarioError(f"there is nobody named {name!r}{suggest(name, actors)}")
         return actors[name]
 
-    # Expectations
-
     def expect(self, expectation: "Expectation | str", name: str = "") -> str:
         """Expect something from the next step on; the verdict is in the run's manifest.
 
@@ -706,8 +700,6 @@ class Simulation:
             if name not in self.scenario.expect:
                 expectation = _parsed(content["expectation"])
                 self._state.expect(self.scenario, name, expectation, content["first"])
-
-    # Copies
 
     def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return an independent copy of the simulation.
@@ -831,8 +823,6 @@ class Simulation:
         if self._store.directory is not None:
             constants["store"] = self._store
         return constants
-
-    # The end
 
     def finish(self, status: Status = "complete") -> Run:
         """Close the run at the present step and return it for reading."""

@@ -248,8 +248,6 @@ class State(Cast):
         """Return the watcher of a kind; None if the run needs none."""
         return next((watcher for watcher in self.watchers if isinstance(watcher, kind)), None)
 
-    # Decisions of scripts
-
     def wait_for(self, kinds: frozenset[str]) -> None:
         """Let spans end at events of some kinds, besides those that components wait for."""
         listened = frozenset[str]().union(*(kinds for _, kinds in self.events.listeners))
@@ -286,8 +284,6 @@ class State(Cast):
             self.listening.append(self.expectations)
             self.events.sinks.append(self.expectations)
         self.expectations.add(name, expectation, since, self.settled)
-
-    # Decisions
 
     def situation(self, row: int, step: int) -> Situation:
         """Return the situation of a body at a step; the same object while nothing in it changes."""
@@ -345,8 +341,6 @@ class State(Cast):
         if self.log is not None and (logged := self.log.next_event(step, kinds)) is not None:
             steps.append(logged)
         return min(steps, default=None)
-
-    # Watching
 
     def take(self, watcher: Watcher, end: int) -> Sequence[Event]:
         """Let a watcher process the steps up to `end` - 1; return its events."""

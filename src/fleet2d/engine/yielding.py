@@ -226,8 +226,6 @@ class Yielding(Watcher):
         if after.position == actor.state.position:
             plan.notes[:0] = self._overlap_notes(now, self._hits(now))
 
-    # Distances to others
-
     def _set_up(self) -> None:
         """Compute the distances between bodies, and move robots that begin in others."""
         actors = self._actors
@@ -409,10 +407,8 @@ class Yielding(Watcher):
             self._pauses.pop(one, None)
         self._distances = None
 
-    # Plans
-
     def _plans(self, now: Situation, at: int, other: int) -> list[tuple[Situation, Plan]]:
-        """Return other plans for a robot, or for the one that it meets at a step; none to go on."""
+        """Return other plans for a robot, or for the body that it meets at a step; empty: go on."""
         row = now.actor.row
         if self._goes_first(row, other, now.step):
             if self._rests(other, now.step):
@@ -652,8 +648,6 @@ class Yielding(Watcher):
             actor.behaviors[actor.arbiter.active].give_up(now)
         return now.plan().stay(stands).note(EventKind.GIVES_UP, name)
 
-    # Free plans and places
-
     def _far(self, now: Situation) -> int:
         """Return the step up to which a plan has to be free."""
         return now.step + self._free_for
@@ -758,7 +752,7 @@ def _is_stuck(actor: DecidingActor) -> bool:
 
 
 def _place_inside(actor: DecidingActor) -> LatticePoint:
-    """Return where a robot is, or the nearest place in its space."""
+    """Return the position of a robot, or the nearest place in its space."""
     x, y = actor.state.position
     if actor.space.part_of_cell[y // SUB, x // SUB] == actor.part:
         return x, y

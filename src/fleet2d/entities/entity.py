@@ -167,8 +167,8 @@ class Robot(Entity):
     Attributes:
         radius: Radius of the body [m].
         speed: Driving speed [m/s].
-        turn_rate_deg: How fast it turns on the spot [deg/s].
-        drive: How it moves along its routes.
+        turn_rate_deg: Rate of turning on the spot [deg/s].
+        drive: Its motion along routes.
         camera: Its only camera; null: it is blind, or has `cameras`.
         cameras: Several cameras, by name, in place of `camera`; their order doesn't matter.
         perception: The errors of cameras without errors of their own; null: none.
@@ -227,7 +227,7 @@ class Robot(Entity):
         return self.climbs
 
     def keep_out_rules(self, body: Body) -> KeepsOut | None:
-        """Return where its body keeps out; None if it may go everywhere."""
+        """Return the rules by which the robot keeps out; None if it may go everywhere."""
         return KeepOutRules(body, self.keep_out) if self.keep_out else None
 
     def model_post_init(self, _: object, /) -> None:

@@ -72,7 +72,7 @@ class Power(Settings):
     it off; it keeps all that it has learned, but nothing about the present.
 
     Attributes:
-        persists: What outlasts its time off: names of algorithms, `map` (which cells it has seen)
+        persists: The memory that outlasts being off: names of algorithms, `map` (the seen cells)
             and `place` (where it is); left out: all. All others begin anew. Algorithms of the
             present, such as `rtp`, keep only what they have learned in any case.
         crashes: The crashes, and the time until it is on again.

@@ -31,7 +31,7 @@ class Circumstances(NamedTuple):
         time: The local time.
         name: The interaction's name in the scenario.
         interaction: The interaction.
-        activity: What the person does; empty if unknown.
+        activity: The person's activity; empty if unknown.
         room: Type of the room that the person is in; empty outside of rooms.
         company: Number of other people in that room.
         is_moving: Whether the person is going somewhere.
@@ -239,7 +239,7 @@ FARTHEST_M = 2.5
 
 
 class MannerPart(AnswerPart):
-    """How the robot comes: too near, from far away, from behind, in the way.
+    """The robot's manner of coming: too near, from far away, from behind, in the way.
 
     Attributes:
         off: Added if it is nearer than 0.45 m or farther than 2.5 m.
@@ -271,14 +271,14 @@ class RecencyPart(AnswerPart):
     at_once: float = -1.5
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Add the faded term of the last time."""
+        """Add the term of the last prompt, faded by now."""
         if state.last is None:
             return 0.0
         return self.at_once * max(0.0, 1 - (now.time - state.last) / timedelta(hours=1))
 
 
 class BurdenPart(AnswerPart):
-    """Too many prompts of late.
+    """Too many recent prompts.
 
     Attributes:
         tolerance: Prompts a day that are no burden.
@@ -320,7 +320,7 @@ class AttitudePart(AnswerPart):
 
 
 class Reply(NamedTuple):
-    """How a person answers.
+    """The answer of a person.
 
     Attributes:
         outcome: The outcome that the robot sees.
@@ -434,7 +434,7 @@ PARTS = (
 
 
 class Answers(Component):
-    """How a person answers robots; each part may be replaced by a class of your own.
+    """The model of a person's answers to robots; your own class may replace each part.
 
     Attributes:
         notice: Whether the robot is noticed.
@@ -446,7 +446,7 @@ class Answers(Component):
         recency: The effect of a recent interaction on accepting.
         burden: The effect of many prompts on accepting.
         attitude: The effect of novelty, habit, trust and annoyance on accepting.
-        months: How the attitude changes.
+        months: The change of the attitude over time.
         initiative: Contacts that the person starts without being addressed.
         defers: Probability that a person who isn't available asks to be addressed later.
         later: Least and greatest time after which the robot may come again.
@@ -528,7 +528,7 @@ class Answers(Component):
         return Reply(outcome, delay, later, willingness, woke)
 
     def complaint(self, state: AttitudeState, room: str, urgent: float = 0.0) -> Outcome | None:
-        """Return how a person who is annoyed enough gets rid of a robot.
+        """Return the way in which a person who is annoyed enough gets rid of a robot.
 
         Args:
             state: The person's attitude.
@@ -550,7 +550,7 @@ class Answers(Component):
 
 
 def _between(limits: tuple[timedelta, timedelta], share: float) -> timedelta:
-    """Return the duration at a share of the way between two, in whole seconds."""
+    """Return a duration between two, interpolated by a share, in whole seconds."""
     low, high = limits
     return timedelta(seconds=round((low + (high - low) * share).total_seconds()))
 

@@ -36,12 +36,12 @@ class AttitudeState:
     Attributes:
         time: The moment of the state.
         novelty: 1 at first, falling to 0.
-        burden: Prompts a day of late, an exponential mean.
+        burden: Recent prompts a day, an exponential mean.
         annoyance: Accumulated by badly timed prompts, fading; 0: none.
         trust: 0 to 1.
         habits: How much each interaction is expected at a time of day, and when: strength from 0 to
             1, and the time of day [s], by the interaction's name.
-        last: When the robot addressed the person last; None: never.
+        last: Time at which the robot last addressed the person; None: never.
     """
 
     time: datetime
@@ -53,14 +53,14 @@ class AttitudeState:
     last: datetime | None = None
 
     def expects(self, name: str, time: datetime, window: timedelta) -> float:
-        """Return how much an interaction is expected at a time, 0 to 1."""
+        """Return the strength with which an interaction is expected at a time, 0 to 1."""
         strength, usual_s = self.habits.get(name, (0.0, 0.0))
         off_s = abs((written(time) - midnight_of(time)).total_seconds() - usual_s)
         return strength if min(off_s, DAY_S - off_s) <= window.total_seconds() else 0.0
 
 
 class Attitude(Component):
-    """How a person's attitude to a robot changes: interest that fades, some patience.
+    """The change of a person's attitude to a robot: interest that fades, some patience.
 
     Attributes:
         novelty_lasts: Half-life of the novelty.
@@ -98,7 +98,7 @@ class Attitude(Component):
         Args:
             state: The attitude.
             name: The interaction's name.
-            outcome: How the person answered.
+            outcome: The person's answer.
             willingness: Probability that the person was available, 0 at the worst moment.
         """
         state.last = state.time

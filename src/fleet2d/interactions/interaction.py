@@ -61,10 +61,10 @@ class Interaction(Settings):
         at: Times of day at which a request comes up.
         on: The days on which requests come up.
         every: Interval between two requests, from the start on, instead of `at`.
-        within: How long a request is open.
+        within: Time for which a request is open.
         worth: Its value if it is carried out at once, in any unit.
         falls_to: The part of the value that is left at the deadline.
-        takes: How long it takes once the person has accepted.
+        takes: Its duration once the person has accepted.
         distance: Distance at which the robot stops [m].
         manner: Whether it speaks, or only shows a text, which has to be in sight.
         tries: Number of times that the robot addresses the person, at most.
@@ -144,7 +144,7 @@ class Request:
     Attributes:
         name: The interaction's name in the scenario.
         interaction: The interaction.
-        since: When it came up.
+        since: Time at which it came up.
         not_before: Time from which the robot may try (again).
         tries: Number of times that the person was addressed.
         is_fetched: Whether the robot has what it delivers.

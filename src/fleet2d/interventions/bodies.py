@@ -120,7 +120,7 @@ class Send(BodyIntervention):
     Attributes:
         to: The destination: a room, furniture, or a point.
         heading_deg: Its heading there, counter-clockwise from +x; left out: ahead.
-        duration: How long it stays there; left out: until it is released.
+        duration: Time for which it stays there; left out: until it is released.
 
     Example:
         >>> Send("astro", "sofa", duration="20 min").duration
@@ -145,7 +145,7 @@ class HoldStill(BodyIntervention):
     """Let a body stay still where it is, until it is released.
 
     Attributes:
-        duration: How long it stays still; left out: until it is released.
+        duration: Time for which it stays still; left out: until it is released.
         posture: The posture of a person, such as lie after a fall; left out: as before.
 
     Example:
@@ -329,7 +329,7 @@ class Away(PersonIntervention):
     """Send a person to the exit, and away until called home.
 
     Attributes:
-        duration: How long the person is away; left out: until called home or released.
+        duration: Time for which the person is away; left out: until called home or released.
 
     Example:
         >>> Away("ana", duration="2 h").duration
@@ -348,7 +348,7 @@ class CallHome(PersonIntervention):
 
     Attributes:
         to: The destination: a room, furniture, or a point.
-        duration: How long the person stays there; left out: until released.
+        duration: Time for which the person stays there; left out: until released.
 
     Example:
         >>> CallHome("ana", to="kitchen").to
@@ -372,7 +372,7 @@ class LetIn(CallHome):
 
     Attributes:
         to: The destination: a room, furniture, or a point.
-        duration: How long the guest stays there.
+        duration: Time for which the guest stays there.
 
     Example:
         >>> LetIn("gina").duration
@@ -398,7 +398,7 @@ class StartActivity(PersonIntervention):
     Attributes:
         what: The name of the activity in the persona or agenda.
         to: The place; left out: where the person's own behavior does it.
-        duration: How long the person does it; left out: until released.
+        duration: Time for which the person does it; left out: until released.
 
     Example:
         >>> StartActivity("ana", "dinner").what

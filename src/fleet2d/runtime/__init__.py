@@ -1,1 +1,1 @@
-"""What every run builds upon: simulated time, events, and reproducible randomness."""
+"""The foundations of every run: simulated time, events, and reproducible randomness."""

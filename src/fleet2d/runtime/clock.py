@@ -39,7 +39,7 @@ CIRCLE = 360 * DEGREE
 OBLIQUITY = 234_393_000
 # With refraction, the sun's upper edge appears while its centre is this far below the horizon.
 HORIZON = -8_330_000
-# It dawns from half an hour before sunrise to half an hour after it, and likewise at sunset.
+# Dawn is from half an hour before sunrise to half an hour after; dusk is the same at sunset.
 TWILIGHT = timedelta(minutes=30)
 
 

@@ -17,12 +17,12 @@ class EventKind(StrEnum):
 
     __repr__ = str.__repr__
 
-    # Cameras
+    # These are events of cameras.
     USER_LOST = "user_lost"
     USER_SEEN = "user_seen"
     ROBOT_LOST = "robot_lost"
     ROBOT_SEEN = "robot_seen"
-    # People
+    # These happen to people.
     ACTIVITY = "activity"
     CAME_HOME = "came_home"
     KNOWN = "known"
@@ -30,7 +30,7 @@ class EventKind(StrEnum):
     REACTS = "reacts"
     UNKNOWN = "unknown"
     USES = "uses"
-    # Robots
+    # These happen to robots.
     ACCEPTED = "accepted"
     ALLOWED = "allowed"
     APPROACHES = "approaches"
@@ -82,7 +82,7 @@ class EventKind(StrEnum):
     VISITS = "visits"
     WAY_BLOCKED = "way_blocked"
     WITHDRAWS = "withdraws"
-    # The home
+    # These happen to the home, its doors and sensors.
     LIGHT_OFF = "light_off"
     LIGHT_ON = "light_on"
     LOCKED = "locked"

@@ -117,8 +117,8 @@ def free_bodies(actors: Iterable[object]) -> None:
 def peak_memory_mb() -> float | None:
     """Return the peak memory of this process so far [MB]; None if the system doesn't tell.
 
-    Linux tells it in `/proc`. `getrusage` would count the process that started this one, too, if
-    that had more.
+    It is read from `/proc` on Linux, since `getrusage` would include a larger peak of the parent
+    process.
     """
     with suppress(OSError):
         for line in Path("/proc/self/status").read_bytes().splitlines():

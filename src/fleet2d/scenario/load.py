@@ -44,7 +44,7 @@ def load_scenario(
     """
     folder = Path.cwd()
     if isinstance(source, str) and "=" in source and not _is_path(source):
-        # as on the command line
+        # An override may stand in place of the scenario, as on the command line.
         overrides = (source, *overrides)
         source = None
     if isinstance(source, Scenario):
@@ -63,7 +63,7 @@ def scenario_of(document: Document, folder: Path) -> Scenario:
     """Check a composed scenario as a whole, and return it.
 
     Args:
-        document: What `compose` returns.
+        document: The result of `compose`.
         folder: The folder of the file that it was read from.
 
     Raises:

@@ -105,11 +105,11 @@ def _refuse_file_as_type(value: Any) -> Any:
 
 
 class Daylight(Settings):
-    """Where the home is, for the times of sunrise and sunset.
+    """The place of the home, for the times of sunrise and sunset.
 
     Attributes:
         latitude: Its latitude, north is positive [deg].
-        noon: When the sun is highest by the clock, in the mean of the year; 12:10 with summer time
+        noon: Solar noon by the clock, averaged over the year; 12:10 with summer time
             is 13:10. In a time zone, summer time is added to it.
     """
 
@@ -126,7 +126,7 @@ class TimeZone(Settings):
         name: Its name.
         standard_s: Its offset from UTC without summer time.
         offset_s: Its offset before the first change.
-        changes: When the offset changes, in order, and the offset from then on [s].
+        changes: The times of changes of the offset, in order, with the offset from then on [s].
     """
 
     name: str = Field(min_length=1, examples=["Europe/Berlin"])
@@ -171,10 +171,10 @@ class SimulationSettings(Settings):
         max_span: The maximum number of steps computed at once. It doesn't change results.
         ghosts: Bodies pass through each other; else robots yield to people and to each other.
         right_of_way: Which of two robots yields.
-        people_block: How long a person waits for another body in the way before going round it;
-            null: people walk on, and robots keep out of their way.
+        people_block: Time for which a person waits for another body in the way before going round
+            it; null: people walk on, and robots keep out of their way.
         speedup: Run at this many times real time; null: as fast as possible.
-        daylight: Where the home is, if nights are to be longer in winter; null: lights and
+        daylight: The place of the home, if nights are to be longer in winter; null: lights and
             detection go by the time of day alone.
         time_zone: The time zone of the home, whose clocks may change; null: each day has 24 hours.
     """
@@ -260,7 +260,7 @@ class Scenario(Settings):
         users: The people, by name.
         robots: The robots, by name.
         objects: Doors and sensors, by name.
-        interactions: What robots want of people, by name.
+        interactions: The requests of robots to people, by name.
         script: Interventions on people, robots and the home, and when they happen.
         sight: The method that computes what is in view.
         algorithms: The algorithms that run during the simulation, by name.
@@ -376,7 +376,7 @@ class Scenario(Settings):
         return self._folder
 
     def where(self, path: str) -> str:
-        """Return where a key is written, or the nearest key around it: 'home.yaml:15', else ''.
+        """Return the place of a key, or of the nearest key around it: 'home.yaml:15', else ''.
 
         Args:
             path: the key's path as in messages, like 'users.ana.days.0.items.1.place'; for a short

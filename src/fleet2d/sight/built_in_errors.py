@@ -51,8 +51,8 @@ class Outliers(PerceptionError):
         share: Share of sightings that are outliers.
         spread: Standard deviation of their error in distance, bell-shaped and independent in each
             look [m].
-        lasts: How long a person stays an outlier, rounded to steps, in intervals from the start of
-            the run; 0: each look by itself.
+        lasts: Time for which a person stays an outlier, rounded to steps, in intervals from the
+            start of the run; 0: each look by itself.
     """
 
     share: Share = 0.02
@@ -68,7 +68,7 @@ class Outliers(PerceptionError):
 
 
 class Confusable(Settings):
-    """How often a user is taken for others. Short form: a number is the rate.
+    """The rate at which a user is taken for others. Short form: a number is the rate.
 
     Attributes:
         rate: Share of sightings in which the user is taken for somebody else; left out: by height.
@@ -114,7 +114,7 @@ class TakenFor(PerceptionError):
 
     Attributes:
         users: The users that are taken for others, by name: a rate, or a kind or height.
-        lasts: How long somebody is taken for another, rounded to steps, in intervals from the start
+        lasts: Time of being taken for one user, rounded to steps, in intervals from the start
             of the run; 0: each look by itself.
     """
 

@@ -1,4 +1,4 @@
-"""Cameras of robots: settings, errors and disturbances, also in the integers of the core."""
+"""Cameras of robots: settings, errors and disturbances, and their form in integers of the core."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class Pan(Settings):
 
     Attributes:
         headings_deg: Directions, one after the other, relative to its heading on the body.
-        dwell: How long it looks in each direction.
+        dwell: Time of looking in each direction.
     """
 
     headings_deg: tuple[AngleDeg, ...] = Field(
@@ -458,7 +458,7 @@ def dark_cameras(names: Collection[str], disturbances: Iterable[Disturbance]) ->
 
 
 class SightSettings(Settings):
-    """How a run computes what is in view.
+    """The computation of views in a run.
 
     Attributes:
         method: Method that decides whether somebody is in view: line_of_sight, visibility_polygon,
@@ -467,7 +467,7 @@ class SightSettings(Settings):
             that passes within its radius.
         heights: Whether the heights of cameras, bodies and furniture matter: low furniture hides
             only the lower parts of what is behind it, and so do bodies, if they hide people.
-        seen_every: How often the area in view is computed, for the layers of what robots have seen
+        seen_every: Time between two computations of the area in view, for layers of seen cells
             and the exposure of rooms; null: in every step.
     """
 

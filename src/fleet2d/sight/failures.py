@@ -40,7 +40,7 @@ class Failures(Settings):
     Attributes:
         at: The moments: a local time, or the time since the start; one, or a list.
         per_day: Mean number of further failures a day, at random times.
-        lasts: How long a failure lasts.
+        lasts: Duration of a failure.
 
     Example:
         >>> Failures(at="2 h", lasts="10 min").at

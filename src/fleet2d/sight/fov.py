@@ -148,7 +148,7 @@ class FieldOfView(Component):
             home: The home.
             x: Position of the camera [lattice units].
             y: Position of the camera [lattice units].
-            heading: Where it looks [1/4096 turn].
+            heading: Heading of the camera [1/4096 turn].
             reach: Its range and angle.
             points: int64 (n, 2).
 

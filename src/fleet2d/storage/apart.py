@@ -75,7 +75,7 @@ class _Failure:
         kind: Fleet2D's error about the file (`file`) or about what is installed (`input`), a lack
             of memory, or another exception.
         text: The message.
-        place: Where a picture is unclear, and the radius of that place [pixels].
+        place: The place at which a picture is unclear, and its radius [pixels].
     """
 
     kind: Literal["file", "input", "memory", "other"]
@@ -101,7 +101,7 @@ def apart(
     failure: type[InputError] = FloorPlanError,
     seconds: Bound = READ_SECONDS,
 ) -> T:
-    """Return what a function of Fleet2D returns for a file, called in the child.
+    """Call a function of Fleet2D for a file in the child, and return its result.
 
     Args:
         path: The file, for messages.
@@ -185,7 +185,7 @@ def _stop(grace: float = 0.0) -> int:
     """End the child, if there is one, and return its exit status.
 
     Args:
-        grace: How long it has to die by itself [s].
+        grace: Time that the child has to end by itself [s].
     """
     global _child
     process = _child
@@ -236,9 +236,6 @@ def _beyond(path: Path, what: str, bound: Bound) -> str:
         f"{path} takes {what} to read than {bound.limit} {bound.noun}: simplify it, or set"
         f" {bound.variable}={2 * bound.limit} in the environment"
     )
-
-
-# --- Answers -----------------------------------------------------------------------------------
 
 
 def _encode(value: object) -> bytes:
@@ -303,9 +300,6 @@ def _adapter(kind: Any) -> TypeAdapter[tuple[Any]]:
     # A dataclass alone takes no settings, so it is wrapped in a tuple.
     settings = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
     return TypeAdapter(tuple[kind], config=settings)
-
-
-# --- The child ---------------------------------------------------------------------------------
 
 
 def serve() -> None:

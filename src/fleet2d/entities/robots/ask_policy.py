@@ -35,15 +35,15 @@ from fleet2d.runtime.events import EventKind
 DOES: tuple[str, ...] = get_args(InteractionKind)
 
 ASK_COLUMNS = (
-    # The interaction and its open request
+    # These describe the interaction and its open request.
     *("interaction", "open", "worth", "value", "time_left", "tries"),
     *(f"do_{kind}" for kind in DOES),
-    # Its person, as the robot has seen them
+    # These describe its person, as the robot has seen them.
     *("in_view", "seen_30min", "seen_6h", "seen_now"),
     *(f"in_{kind}" for kind in KINDS),
-    # The answers so far
+    # These count the answers so far.
     *("asked_1h", "asked_1d", "yes", "yes_now", "time_now"),
-    # Values that are the same in all rows
+    # These are the same in all rows.
     *("hour_sin", "hour_cos", "weekend", "weeks"),
 )
 """The columns of an observation, in their order: see docs/how-to/gym.md."""
@@ -101,8 +101,6 @@ class AskPolicy(LearnedBehavior, Interact):
         self.accepted = np.zeros((self.requests, HOURS))
         self.had_time = np.zeros((self.requests, HOURS))
         self.asked_at = np.full(self.requests, -np.inf)  # [s since the start]
-
-    # Observations
 
     def names(self, now: Situation) -> list[str]:
         """Return the names of the robot's interactions, in the order of the rows.
@@ -219,8 +217,6 @@ class AskPolicy(LearnedBehavior, Interact):
             "yes_now": _rate(self.accepted[row, hours], self.asked[row, hours]),
             "time_now": _rate(self.had_time[same][:, hours], self.asked[same][:, hours]),
         }
-
-    # Decisions
 
     def asks(self, now: Situation) -> bool:
         """Return whether the decision at a step depends on the policy."""

@@ -82,7 +82,7 @@ class Dock(Behavior):
         return not self.rest or bool(self.when or self.cooldown)
 
     def decide(self, now: Situation) -> Plan | None:
-        """Charge, if the charge is low; rest at the charger, if `rest` says so."""
+        """Charge, if the charge is low; rest at the charger, with `rest`."""
         charge = now.actor.charge
         assert charge is not None
         plan = now.plan()

@@ -26,7 +26,7 @@ class Explore(Behavior):
     """Complete the layer `explored` of the robot, frontier by frontier.
 
     A frontier is unseen floor beside floor that was seen (Yamauchi 1997). Among the places within
-    `reach` of a frontier, the robot drives to the one that shows most unseen floor per second of
+    `reach` of a frontier, the robot drives to that with the most unseen floor in view per second of
     the way and a turn (González-Baños and Latombe 2002). There it turns once, and decides again.
     Walls and tall furniture count as they are at present. It has finished when `enough` of the
     floor is seen of all rooms that it could enter at the beginning of the run, or when no look

@@ -76,7 +76,7 @@ class HangoutPlaces:
         return read_only(self.points), read_only(self.room), seats, block, prox
 
     def nearness(self, by: Nearness, tau: float) -> F64:
-        """Return how near each place is to people in each room, float64 (n, rooms), 0 to 1.
+        """Return the nearness of each place to people in each room, float64 (n, rooms), 0 to 1.
 
         `room`: 1 in the same room, else 0. `view`: the share of the room's seats in range and in
         sight. `path`: exp(-t / tau), with t the travel time to the nearest point of the room [s].
@@ -181,7 +181,7 @@ class HangoutPlaces:
         return blocked / max(ways, 1)
 
     def _proximity(self) -> F64:
-        """Return how deep each place is in the personal space of the nearest seat, 0 to 1."""
+        """Return the depth of each place in the personal space of the nearest seat, 0 to 1."""
         plan = self._actor.home.plan
         uses = [use.at for thing in self._actor.home.objects for use in thing.uses]
         if not uses or not len(self.points):
@@ -213,7 +213,7 @@ def decay(x: F64) -> F64:
 OFF_DOORS_M = 0.8
 # Weight of being near a seat, in relation to that of blocking ways.
 SEAT_WEIGHT = 0.5
-# Exploring a room has to show this part of it, by at most so many viewpoints.
+# Exploring a room has to show this part of it, from at most this many viewpoints.
 SHARE_TO_SHOW = 0.95
 MAX_VIEWS = 4
 

@@ -52,16 +52,16 @@ KINDS: dict[str, tuple[str, ...]] = {
 KIND_OF_TYPE = {room_type: kind for kind, types in KINDS.items() for room_type in types}
 
 COLUMNS = (
-    # The home
+    # These describe the home.
     *("room", "reachable", "area"),
     *(f"is_{kind}" for kind in KINDS),
-    # The robot
+    # These describe the robot.
     *("here", "way", "visited_20min", "visited_6h"),
-    # The person, or anyone
+    # These are about the person, or anyone.
     *("belief", "in_view", "seen_30min", "seen_6h", "habit", "habit_now"),
-    # Each of the first people
+    # These are about each of the first people.
     *(f"{name}_{n}" for n in range(PEOPLE) for name in ("belief", "seen_30min", "habit_now")),
-    # Values that are the same in all rooms
+    # These are the same in all rooms.
     *("hour_sin", "hour_cos", "weekend", "away", "charge", "last_seen", "elapsed"),
 )
 """The columns of an observation, in their order: see docs/how-to/gym.md."""
@@ -423,8 +423,6 @@ class Policy(LearnedBehavior):
         self._shown = shown_memory(self.names, self.user)
         self._person = int(self._shown.fresh_rows[PERSON])
 
-    # Observations
-
     def observe(self, now: Situation) -> F32:
         """Return the observation, float32 (rooms, columns): see docs/how-to/gym.md."""
         actor = now.actor
@@ -484,8 +482,6 @@ class Policy(LearnedBehavior):
             row[_AT[f"is_{KIND_OF_TYPE.get(room.type, 'other')}"]] = 1
         table[self.poses.index, _AT["reachable"]] = 1
         return table
-
-    # Decisions
 
     def asks(self, now: Situation) -> bool:
         """Return whether the decision at a step depends on the policy."""

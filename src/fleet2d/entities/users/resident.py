@@ -63,8 +63,8 @@ class Spots:
 
     The spots of a room are a grid. The members of a household divide them by rank: spot i belongs
     to the member i modulo the number of members. So two members never stand on the same spot, and
-    none has to know where the others are. Places at furniture are divided likewise. In a room with
-    fewer spots than members, members share spots.
+    none has to know where the others are. Places at furniture are divided in the same way. In a
+    room with fewer spots than members, members share spots.
 
     Attributes:
         rank: The number of the body among the members of its household.
@@ -316,8 +316,6 @@ class KnownHome:
             self._core_venues[key] = self._make_core_venue(name, venue)
         return self._core_venues[key]
 
-    # Callbacks of the core
-
     def spots(self, room: int) -> Sequence[Spot]:
         """Return the points of a room where the body stands."""
         return self._person.spots.in_room(self._actor.home.rooms[room])
@@ -352,8 +350,6 @@ class KnownHome:
     def way_out(self) -> LatticePoint:
         """Return the lattice point where the body leaves the home."""
         return self._actor.way_out
-
-    # Arguments and results of the core
 
     def _make_core_venue(self, name: str, venue: Venue) -> CoreVenue:
         activity = venue.activity
@@ -430,7 +426,7 @@ class ResidentBehavior(Behavior):
         raise NotImplementedError
 
     def wait_for(self, room: int, clock: Clock, begin_us: int, takes_us: int) -> int | None:
-        """Return how long to wait before it may use a room [us]; None: not now."""
+        """Return the time to wait before the person may use a room [us]; None: not now."""
         return 0
 
     def make_spots(self, actor: Actor) -> Spots:

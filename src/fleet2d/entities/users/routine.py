@@ -416,7 +416,7 @@ class Routine(ResidentBehavior):
         return self.lives.day(ordinal)[self.name]
 
     def wait_for(self, room: int, clock: Clock, begin_us: int, takes_us: int) -> int | None:
-        """Return how long to wait before it may use a room [us]; None: not now.
+        """Return the time to wait before the person may use a room [us]; None: not now.
 
         Members of a household take turns in private rooms: for short visits, each of them has a
         slot of a quarter of an hour in turn, outside the planned activities of others there.
