@@ -302,7 +302,7 @@ class Routine(ResidentBehavior):
             out: works_outside.
         household: The person's household: a mapping or a YAML file, the same for all members.
         away: Holidays, out of the home.
-        visits: The times of presence of a visitor, as far as its persona allows them.
+        visits: The times of presence of a visitor, except while its persona is out.
     """
 
     persona: AnyPersona | None = None
