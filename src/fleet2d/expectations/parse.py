@@ -156,13 +156,13 @@ class _Reader:
     def _joined(self, node: ast.BoolOp | ast.BinOp) -> Any:
         """Read parts joined by and, or, &, | or arithmetic."""
         if type(node.op) not in _OPERATORS:
-            raise self._foreign(node)
+            raise self._syntax_error(node)
         nodes = node.values if isinstance(node, ast.BoolOp) else [node.left, node.right]
         if not isinstance(node.op, _ARITHMETIC):
             return reduce(_OPERATORS[type(node.op)], map(self.expectation, nodes))
         operands = [self.value(each) for each in nodes]
         if not any(isinstance(operand, Signal) for operand in operands):
-            raise self._foreign(node)
+            raise self._syntax_error(node)
         try:
             return _OPERATORS[type(node.op)](*operands)
         except TypeError:
@@ -179,9 +179,9 @@ class _Reader:
                 return f"{self.value(node.value)}.{node.attr}"
             case ast.Tuple(elts=elements) | ast.List(elts=elements):
                 return tuple(self.value(element) for element in elements)
-        raise self._foreign(node)
+        raise self._syntax_error(node)
 
-    def _foreign(self, node: ast.expr) -> InputError:
+    def _syntax_error(self, node: ast.expr) -> InputError:
         return InputError(
             f"{ast.unparse(node)} can't be part of an expectation (a name with signs in it needs"
             ' quotes, like "robot-1")'

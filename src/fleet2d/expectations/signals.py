@@ -432,10 +432,10 @@ class Arithmetic(Signal):
     other: Any
 
     def __post_init__(self) -> None:
-        for name, value, beside in (("one", self.one, self.other), ("other", self.other, self.one)):
+        for name, value, signal in (("one", self.one, self.other), ("other", self.other, self.one)):
             if not isinstance(value, Signal):
-                unit = beside.unit if self.sign in "+-" else ""
-                object.__setattr__(self, name, _number(value, unit, beside))
+                unit = signal.unit if self.sign in "+-" else ""
+                object.__setattr__(self, name, _number(value, unit, signal))
         if self.sign in "+-":
             _check_units(self.one, self.other, self)
 
@@ -541,7 +541,7 @@ class SignalComparison(Expectation):
         return f"{self.signal} {self.sign} {operand_text(self.limit, self.signal.unit)}"
 
 
-def _number(value: object, unit: str, beside: object) -> float:
+def _number(value: object, unit: str, signal: object) -> float:
     """Return a number in the unit of the signal beside it.
 
     Raises:
@@ -552,15 +552,15 @@ def _number(value: object, unit: str, beside: object) -> float:
             number = float(QUANTITIES[unit].parse(value))
             if unit == "share" and not 0 <= number <= 1:
                 raise InputError(
-                    f"{beside} is compared with {value}: a share is a number from 0 to 1, or from"
+                    f"{signal} is compared with {value}: a share is a number from 0 to 1, or from"
                     f" 0 % to 100 %{f', such as {value} %' if 1 < number <= 100 else ''}"
                 )
             return number
         if isinstance(value, int | float | np.number) and not isinstance(value, bool):
             return float(value)
     except PydanticCustomError as error:
-        raise InputError(f"{beside} is compared with {value!r}: {error}") from None
-    raise InputError(f"{beside} is compared with {value!r}, expected a number")
+        raise InputError(f"{signal} is compared with {value!r}: {error}") from None
+    raise InputError(f"{signal} is compared with {value!r}, expected a number")
 
 
 def _check_units(one: object, other: object, of: object) -> None:

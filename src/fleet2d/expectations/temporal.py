@@ -96,7 +96,7 @@ class Windowed(Word, Expectation):
         scene.check_within(self.within, self)
         super().check(scene)
 
-    def _beyond(self, run: RunSignals, neutral: float, high: bool) -> float:
+    def _value_beyond(self, run: RunSignals, neutral: float, high: bool) -> float:
         return run.beyond(neutral, high=high, bounded=self.within is not None)
 
 
@@ -124,7 +124,7 @@ class Invariant(Limited):
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the minimum robustness of the operand over the window starting at each step."""
         low, high_end = run.reach(self.within)
-        after = self._beyond(run, INFINITE, high)
+        after = self._value_beyond(run, INFINITE, high)
         return self.operand.robustness(run, high).sliding_min(low, high_end, INFINITE, after)
 
     def violations(self, run: RunSignals) -> list[Violation]:
@@ -175,7 +175,7 @@ class eventually(Limited):
     def robustness(self, run: RunSignals, high: bool) -> Trace:
         """Return the maximum robustness of the operand over the window starting at each step."""
         low, high_end = run.reach(self.within)
-        after = self._beyond(run, -INFINITE, high)
+        after = self._value_beyond(run, -INFINITE, high)
         return self.part.robustness(run, high).sliding_max(low, high_end, -INFINITE, after)
 
     def slack(self, run: RunSignals) -> int | None:
@@ -235,7 +235,7 @@ class until(Limited):
         """Return the maximum over later steps t of min(goal at t, minimum of `hold` before t)."""
         hold = self.hold.robustness(run, high)
         goal = self.goal.robustness(run, high)
-        after = self._beyond(run, -INFINITE, high)
+        after = self._value_beyond(run, -INFINITE, high)
         return _until(hold, goal, None if self.within is None else run.reach(self.within), after)
 
     def violations(self, run: RunSignals) -> list[Violation]:

@@ -90,10 +90,10 @@ class Verdict:
         if self.holds is None:
             return f"{self.name} is untested: {self.untested}"
         if self.holds:
-            return f"{self.name} {'held' if self.decided else 'holds so far'}{self._by_how_much()}"
-        return f"{self.name} is violated: {self.expectation}{self._when()}"
+            return f"{self.name} {'held' if self.decided else 'holds so far'}{self._margin_words()}"
+        return f"{self.name} is violated: {self.expectation}{self._violation_times()}"
 
-    def _by_how_much(self) -> str:
+    def _margin_words(self) -> str:
         if self.occasions == 0:
             return ", as its trigger hasn't happened yet"
         parts = []
@@ -103,7 +103,7 @@ class Verdict:
             parts.append(f"with {duration_in_words(timedelta(seconds=self.slack_s))} to spare")
         return f" {', '.join(parts)}" if parts else ""
 
-    def _when(self) -> str:
+    def _violation_times(self) -> str:
         worst = self.worst
         if worst is None:
             return ""

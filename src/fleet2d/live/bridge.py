@@ -341,7 +341,7 @@ class Bridge:
                 _wait(due, min(LEAD_S, LEAD_SHARE * step_s / self.speed))
                 self.lateness_s.append(time.monotonic() - due)
             self._apply(self._one_reading_each(self._received()))
-            self._stop_the_silent()
+            self._stop_silent_bodies()
             with deferred_interrupt(self._stop):  # half a step could not be stored
                 simulation.advance()
             self._send()
@@ -489,7 +489,7 @@ class Bridge:
                 self._replace(message, sender, later)
                 continue
             try:
-                mended = self._mended(message)
+                mended = self._corrected(message)
                 if key is not None:
                     for act in _acts_of(mended):
                         check_intervention(self.simulation, act)
@@ -511,7 +511,7 @@ class Bridge:
         if isinstance(message, GoalMessage):
             self._goals.refuse(message, sender, "another goal came at once")
         elif isinstance(message, PoseMessage) and sender != later:
-            self._tell_two_senders(message.entity)
+            self._report_two_senders(message.entity)
 
     def _refuse(self, message: LiveMessage, sender: Sender, reason: str) -> None:
         self._count("wrong", reason)
@@ -546,16 +546,16 @@ class Bridge:
         off = math.hypot(pose.x - x, pose.y - y)
         is_recent = time.monotonic() - self._heard.get(name, -math.inf) < self.silence_s
         if before != sender and is_recent:
-            self._tell_two_senders(name)
+            self._report_two_senders(name)
         if off > JUMP_M + JUMP_M_PER_S * passed_s:
             jump = f"a pose is {off:.1f} m from the one {passed_s:g} s before"
             self._count("jumps", f"{name}: {jump}")
 
-    def _tell_two_senders(self, name: str) -> None:
+    def _report_two_senders(self, name: str) -> None:
         self._count("of two senders", f"{name}: poses of two programs arrive: name its source")
 
     def _check(self, message: LiveMessage, sender: Sender) -> None:
-        """Refuse messages from others than the source, and poses of bodies that decide."""
+        """Refuse messages from other senders than the source, and poses of bodies not `live`."""
         kind, name = _part_of(message)
         if self._sources.get((kind, name), sender[0]) != sender[0]:
             raise InputError(f"{name} takes messages of its source only, not of others")
@@ -578,7 +578,7 @@ class Bridge:
             name = f" {message.id!r}" if message.id else ""
             raise InputError(f"{message.entity} has no goal{name}")
 
-    def _mended(self, message: LiveMessage) -> LiveMessage:
+    def _corrected(self, message: LiveMessage) -> LiveMessage:
         """Return a message with its pose or detections moved to possible places nearby.
 
         Raises:
@@ -620,7 +620,7 @@ class Bridge:
             return message.model_copy(update={"detections": tuple(inside)})
         return message
 
-    def _stop_the_silent(self) -> None:
+    def _stop_silent_bodies(self) -> None:
         """Let bodies stand whose poses have stopped."""
         now = time.monotonic()
         for name, heard in self._heard.items():

@@ -140,7 +140,7 @@ class Goals:
             goal.order = order
         if order is None or order is not goal.order:
             return goal.state(GoalStatus.CANCELLED, "the body has another order, or none")
-        metres, seconds = self._left(actor)
+        metres, seconds = self._rest_of_way(actor)
         if goal.order.has_reached(actor.state) and not seconds:
             return goal.state(GoalStatus.REACHED)
         if actor.is_immobile:
@@ -150,7 +150,7 @@ class Goals:
         goal.obstacle = None
         return goal.state(GoalStatus.UNDER_WAY, "", metres, seconds)
 
-    def _left(self, actor: DecidingActor) -> tuple[float, float]:
+    def _rest_of_way(self, actor: DecidingActor) -> tuple[float, float]:
         """Return the length [m] and the time [s] of the rest of a planned way."""
         clock = self._simulation.clock
         now_us = self._simulation.step * clock.step_us

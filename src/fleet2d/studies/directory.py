@@ -154,7 +154,7 @@ class StudyDirectory:
     """
 
     def __init__(self, location: str | Path) -> None:
-        """Name the folder; nothing is read or written.
+        """Resolve the location; nothing is read or written.
 
         Raises:
             InputError: polars is not installed.

@@ -243,7 +243,7 @@ def estimate(
         return MeanEstimate(mean, doubt, 0.0, freedom, spread=spread, signs=signs)
     error = math.sqrt(variance)
     skewness = third_moment / (error * variance) if freedom >= MIN_FREEDOM else 0.0
-    few = _few(spread, variance)
+    few = _doubts(spread, variance)
     least, largest = limits
     is_within = least <= data.min() and data.max() <= largest
     return MeanEstimate(
@@ -298,7 +298,7 @@ def _signs(data: F64, numbers: I64) -> tuple[int, int]:
     return int((sums > smallest).sum()), int((sums < -smallest).sum())
 
 
-def _few(spread: Spread, variance: float) -> dict[str, str]:
+def _doubts(spread: Spread, variance: float) -> dict[str, str]:
     """Return the levels with too few units to include rare kinds, each with its doubt in words."""
     reasons = {}
     for number, (level, count) in enumerate(spread.units.items()):

@@ -243,7 +243,7 @@ class Draw:
 
     @property
     def notes(self) -> list[str]:
-        """Remarks on columns of the table that only label lives, and almost have another name."""
+        """Remarks on columns of the table that only label lives, but may be misspelt features."""
         meant = [
             column
             for column in (HOME, HOUSEHOLD, *FEATURES, self._settings.weight)
@@ -314,7 +314,7 @@ class Draw:
             home = self.homes[of_home.choice(self._fitting(place, needed))]
         else:
             home = self.homes[number % len(self.homes)]
-        return FleetLife(number, _settled(home, row, needed, of_home), household, varied, row)
+        return FleetLife(number, _sized_home(home, row, needed, of_home), household, varied, row)
 
     def _fitting(self, row: int, needed: int) -> list[int]:
         """Return the places of homes that a row of the table and a household can have.
@@ -327,7 +327,7 @@ class Draw:
             listed = self._rows[row].items() if row >= 0 else ()
             asked = {column: value for column, value in listed if column in FEATURES}
             places = range(len(self.homes))
-            self._eligible[key] = [p for p in places if self._may_be(p, needed, asked)]
+            self._eligible[key] = [p for p in places if self._may_fit(p, needed, asked)]
             if not self._eligible[key]:
                 words = ", ".join(f"{column} {value}" for column, value in asked.items())
                 words = words or f"{needed} bedrooms, as a household needs"
@@ -335,12 +335,12 @@ class Draw:
                 raise ScenarioError(f"{where}no home has {words}")
         return self._eligible[key]
 
-    def _may_be(self, place: int, needed: int, asked: Mapping[str, Any]) -> bool:
+    def _may_fit(self, place: int, needed: int, asked: Mapping[str, Any]) -> bool:
         """Return whether a home may have the bedrooms needed and the features asked for."""
         facts = self.facts.get(place)
         if facts is None:
             return True
-        are_like = (_is_like(name, getattr(facts, name), value) for name, value in asked.items())
+        are_like = (_meets_row(name, getattr(facts, name), value) for name, value in asked.items())
         return facts.bedrooms >= needed and all(are_like)
 
     def left_out(self, life: FleetLife, facts: HomeFeatures | None) -> str:
@@ -372,14 +372,14 @@ def _members(household: object) -> list[str]:
     return [name.strip() for name in str(household).split("+")]
 
 
-def _is_like(column: str, fact: Any, asked: Any) -> bool:
+def _meets_row(column: str, fact: Any, asked: Any) -> bool:
     """Return whether a home is as a row of the table asks; no home has exactly a single area."""
     condition = read_condition(asked)
     is_area = column == AREA and not isinstance(condition, Range)
     return asked is None or is_area or fulfils(fact, condition)
 
 
-def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) -> Choice:
+def _sized_home(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) -> Choice:
     """Return a synthetic home with the bedrooms and area of its row, or fit for its household."""
     if not home.changes:
         return home
@@ -389,7 +389,7 @@ def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) ->
     new: dict[str, Any] = {}
     for key in (BEDROOMS, AREA):
         if row.get(key) is not None:
-            value = _within(read_condition(row[key]), draws)
+            value = _drawn_number(read_condition(row[key]), draws)
             new[key] = int(value) if key == BEDROOMS else round(value, 1)
     if needed and not {BEDROOMS, AREA} & {*plan, *new}:
         weights = [weight for _, weight in SPARE_BEDROOMS]
@@ -403,7 +403,7 @@ def _settled(home: Choice, row: Mapping[str, Any], needed: int, draws: Draws) ->
     return Choice({HOME: f"{label} ({size})"}, changes)  # the seed has homes of other sizes, too
 
 
-def _within(condition: Any, draws: Draws) -> float:
+def _drawn_number(condition: Any, draws: Draws) -> float:
     """Draw a number from a range; return a single number as it is."""
     if not isinstance(condition, Range):
         return float(condition)

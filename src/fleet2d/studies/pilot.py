@@ -125,10 +125,10 @@ class Pilot(StudyAnswers):
             says = (
                 "For what differences show, two of its homes or seeds must be complete and differ."
             )
-        few = self._few(kind, sizes[kind], max(1, len(found)))
+        few = self._few_units_text(kind, sizes[kind], max(1, len(found)))
         return Conclusion(question, tuple(filter(None, (cost, few, says))))
 
-    def _few(self, kind: str, count: int, comparisons: int) -> str:
+    def _few_units_text(self, kind: str, count: int, comparisons: int) -> str:
         """Return what a study with too few units for intervals can tell; empty if it has enough."""
         if count >= ENOUGH_UNITS:
             return ""

@@ -183,7 +183,7 @@ def plain(table: "pa.Table") -> "pa.Table":
 
 
 def with_variant(rows: "pa.Table", number: int) -> "pa.Table":
-    """Return the rows of a variant after a column of its number."""
+    """Return the rows of a variant with its number as the first column."""
     import pyarrow as pa
 
     numbers = pa.repeat(pa.scalar(number, pa.int32()), rows.num_rows)

@@ -79,31 +79,33 @@ def looks_of(
     before = without[:, first - 1] if first > 0 else np.zeros(len(without))
     looks = []
     for day in days:
-        has: Bool = begins <= day
+        is_treated: Bool = begins <= day
         otherwise = without[:, day]
-        seen = np.where(has, treated[:, day], otherwise)
+        seen = np.where(is_treated, treated[:, day], otherwise)
         known = np.isfinite(seen) & np.isfinite(otherwise) & np.isfinite(before)
-        is_own = has & known
-        is_other = ~has & known
-        own = int(is_own.sum())
-        others = int(is_other.sum())
+        with_change = is_treated & known
+        without_change = ~is_treated & known
+        own = int(with_change.sum())
+        others = int(without_change.sum())
         difference = low = high = truth = mean_without = math.nan
         if own:
-            truth = float((seen - otherwise)[is_own].mean())
-            mean_without = float(otherwise[is_own].mean())
+            truth = float((seen - otherwise)[with_change].mean())
+            mean_without = float(otherwise[with_change].mean())
         if own and others:
-            adjusted = seen - _slope(seen[known], before[known], has[known]) * before
-            difference = float(adjusted[is_own].mean() - adjusted[is_other].mean())
+            adjusted = seen - _slope(seen[known], before[known], is_treated[known]) * before
+            difference = float(adjusted[with_change].mean() - adjusted[without_change].mean())
             if min(own, others) >= ENOUGH_UNITS:
-                low, high = two_sample_interval(adjusted[is_own], adjusted[is_other], level)
+                low, high = two_sample_interval(
+                    adjusted[with_change], adjusted[without_change], level
+                )
         look = RolloutLook(day + 1, own, others, difference, low, high, truth, mean_without)
         looks.append(look)
     return looks
 
 
-def _slope(values: F64, before: F64, has: Bool) -> float:
+def _slope(values: F64, before: F64, is_treated: Bool) -> float:
     """Return the slope of values over those before the rollout, by which values are adjusted."""
-    centred = before - np.where(has, before[has].mean(), before[~has].mean())
+    centred = before - np.where(is_treated, before[is_treated].mean(), before[~is_treated].mean())
     square = float((centred**2).sum())
     return float((centred * values).sum()) / square if square > 0 else 0.0
 

@@ -57,11 +57,11 @@ class Conclusion:
         lines += self.sentences
         if self.table:
             head, rows = cells_of(self.table[:MAX_ROWS])
-            lines += ["", *_aligned([head, *rows]), *self._rest]
+            lines += ["", *_aligned([head, *rows]), *self._rows_left_out]
         return "\n".join(lines)
 
     @property
-    def _rest(self) -> list[str]:
+    def _rows_left_out(self) -> list[str]:
         """A line with the number of rows that a text doesn't show, if any."""
         more = len(self.table) - MAX_ROWS
         return [f"… and {counted(more, 'more row')}"] if more > 0 else []
@@ -72,7 +72,7 @@ class Conclusion:
         parts += [f"<p>{html.escape(' '.join(self.sentences))}</p>"]
         if self.table:
             parts.append(html_table(*cells_of(self.table[:MAX_ROWS])))
-        return "".join([*parts, *(f"<p>{rest}</p>" for rest in self._rest)])
+        return "".join([*parts, *(f"<p>{rest}</p>" for rest in self._rows_left_out)])
 
 
 def is_missing(value: Any) -> bool:
@@ -266,14 +266,14 @@ class StudyAnswer:
         clear_first = sorted(self.comparisons, key=lambda c: not c.is_clear)
         table = [self._row(each) for each in clear_first]
         if not study.counts.complete:
-            sentences = [self._nothing(), self._cost()]
+            sentences = [self._no_findings(), self._cost()]
         else:
             if not self.comparisons:
                 table = [self._mean(metric) for metric in study.metrics[:MAX_METRICS]]
             sentences = list(filter(None, [*self._findings(), self._left_out(), self._cost()]))
         return Conclusion(study.meta.description or study.meta.name, tuple(sentences), tuple(table))
 
-    def _nothing(self) -> str:
+    def _no_findings(self) -> str:
         study = self._study
         counts = study.counts
         missing = f"; {counts.missing} have not run" if counts.missing else ""

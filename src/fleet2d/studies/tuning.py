@@ -348,7 +348,7 @@ def _check_identity(
         with storage.reading(SEARCH):
             stored = TypeAdapter(dict[str, str]).validate_json(storage.read(SEARCH))
         changes = [name for name in identity if identity[name] != stored.get(name)]
-        if changes != [INPUTS]:  # input files change with any other cause, too
+        if changes != [INPUTS]:  # their digest differs whenever another one does
             changes = [name for name in changes if name != INPUTS]
     elif storage.exists(TRIALS):
         changes = ["the version of Fleet2D"]
@@ -391,7 +391,7 @@ class Search:
         self._crew = crew
 
     def run(self, observer: TuneObserver | None) -> None:
-        """Run trials up to the number of the settings; an interrupted batch is filled."""
+        """Run trials up to the number of the settings; an interrupted batch is completed."""
         total = self._settings.trials
         trials = self._study.get_trials(deepcopy=False)
         finished = sum(trial.state.name == "COMPLETE" for trial in trials)

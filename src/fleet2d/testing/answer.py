@@ -36,7 +36,7 @@ def answer(gate: Gate) -> Conclusion:
     texts = (
         f"{headline(gate)}.",
         _failed(gate, ordered),
-        _beyond(gate, ordered),
+        _tolerated(gate, ordered),
         _requirements(gate),
         _open_questions(gate, ordered),
         gate.cost,
@@ -104,7 +104,7 @@ def _name(gate: Gate, each: Tally) -> str:
     return f"{each.name}{where}{covers}"
 
 
-def _how_often(each: Tally) -> str:
+def _failure_text(each: Tally) -> str:
     """Return in how many trials an expectation failed, and by how much in the worst."""
     number = counted(each.trials, "trial")
     if each.errors:
@@ -132,14 +132,14 @@ def _failed(gate: Gate, ordered: Sequence[Tally]) -> str:
     for each in ordered:
         if each in gate.blocking:
             change = gate.change_of.get(each.place)
-            how = _how_often(each)
+            how = _failure_text(each)
             if change is not None and change.worse:
                 how = f"is {change.brief()}"
             parts.append(f"{_name(gate, each)} {how}")
     return f"{listed(parts, 'expectation')}." if parts else ""
 
 
-def _beyond(gate: Gate, ordered: Sequence[Tally]) -> str:
+def _tolerated(gate: Gate, ordered: Sequence[Tally]) -> str:
     """Return the differences and failures that don't speak against the build, in words."""
     parts = []
     for each in ordered:
@@ -194,7 +194,7 @@ def _units(each: Tally) -> int:
     return homes if homes > 1 else each.trials
 
 
-def _least_shown(each: Tally) -> float:
+def _excluded_rate(each: Tally) -> float:
     """Return the highest rate that an accepted claim excludes, as a share of the claimed one."""
     claim = each.claim
     assert claim is not None, "only what was judged is compared"
@@ -206,7 +206,7 @@ def _missed(gate: Gate) -> str:
     held = [each for each in gate.tallies if each.verdict == HELD and each.claim is not None]
     if not held:
         return ""
-    each = min(held, key=_least_shown)
+    each = min(held, key=_excluded_rate)
     claim = each.claim
     assert claim is not None, "only what was judged is told"
     name = gate.short[each.test]
@@ -216,7 +216,7 @@ def _missed(gate: Gate) -> str:
         return f"{name} can't tell {rates} in {counted(claim.seeds, 'trial')}; {more}"
     number = _units(each)
     kind = "trial" if number == each.trials else "home"
-    shown = _least_shown(each)
+    shown = _excluded_rate(each)
     text = f"What fails in less than {percent(1 - shown)} of {kind}s may have gone unseen"
     target = next((rate for rate in RATES if rate > shown), None)
     needed = None if target is None else seeds_for(1.0, target)
@@ -236,7 +236,7 @@ def _unseen(gate: Gate, ordered: Sequence[Tally]) -> str:
             f"The verdicts of {counted(pairs, 'pair')} were compared with {gate.against}; p values"
             f" are exact, and corrected for {counted(len(gate.changes), 'expectation')} (Holm)"
         )
-        more = (_more(gate, each) for each in ordered)
+        more = (_trials_needed(gate, each) for each in ordered)
         return "; ".join([text, *filter(None, more)][:2])
     units = min(change.pairs for change in gate.changes)
     rate = percent(1 - ERROR ** (1 / units))
@@ -249,7 +249,7 @@ def _unseen(gate: Gate, ordered: Sequence[Tally]) -> str:
     return text
 
 
-def _more(gate: Gate, each: Tally) -> str:
+def _trials_needed(gate: Gate, each: Tally) -> str:
     """Return how many more trials would show a difference that isn't clear; empty if it is."""
     change = gate.change_of.get(each.place)
     if change is None or change.direction or change.worse_units == change.better_units:

@@ -258,7 +258,7 @@ class _Suite:
 
         job = SuiteJob(tuple(self.tests), tuple(self.builds))
         failing = [each for each in [*gate.blocking, *gate.known] if each.outcomes]
-        for each, key in [(t, k) for t in failing for k in _to_see(gate, t)[:most]]:
+        for each, key in [(t, k) for t in failing for k in _trials_to_show(gate, t)[:most]]:
             if key in self.files:
                 continue
             names = [test.name for test in self.tests]
@@ -273,7 +273,7 @@ class _Suite:
             self.files[key] = [directory]
             evidence = {r.name: r.evidence for r in result.results}
             for other in failing:
-                if key in _to_see(gate, other)[:most]:
+                if key in _trials_to_show(gate, other)[:most]:
                     self._draw(other, key, directory, evidence.get(other.name))
 
     def _draw(self, each: "Tally", key: "TrialKey", directory: Path, evidence: object) -> None:
@@ -299,7 +299,7 @@ class _Suite:
         """Return the commands that show a failure."""
         from fleet2d.testing.suite import run_name
 
-        key = next(iter(_to_see(gate, each)), None)
+        key = next(iter(_trials_to_show(gate, each)), None)
         if key is None:
             return ""
         test = next(test for test in self.tests if test.name == each.test)
@@ -362,7 +362,7 @@ def _build_of(text: str) -> "Build":
     return Build(path.stem, path)
 
 
-def _to_see(gate: "Gate", each: "Tally") -> "list[TrialKey]":
+def _trials_to_show(gate: "Gate", each: "Tally") -> "list[TrialKey]":
     """Return the trials that show a failure, the worst first; those that got worse come first."""
     change = gate.change_of.get(each.place)
     worse = set(change.worse) if change is not None else set()

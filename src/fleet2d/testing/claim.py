@@ -76,7 +76,7 @@ class RateTest(NamedTuple):
         return None
 
     def acceptance(self, rate: float) -> float:
-        """Return the exact probability that the claim is accepted if this is the true rate."""
+        """Return the exact probability that the claim is accepted if `rate` is the true rate."""
         return sum_in_order(accepted for accepted, _, _ in steps_of(self.accept, self.refuse, rate))
 
 
@@ -495,7 +495,7 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
         code = getattr(function, "__code__", None)
         folder = Path(code.co_filename).parent if code is not None else Path()
         claim = Claim(
-            _beside(folder, scenario),
+            _path_beside_test(folder, scenario),
             overrides,
             settings,
             {**_homes(folder, homes), **(axes or {})},
@@ -513,7 +513,7 @@ def trial(  # noqa: PLR0913 - all that a test may say of its trials
     return decorate
 
 
-def _beside(folder: Path, source: Any) -> Any:
+def _path_beside_test(folder: Path, source: Any) -> Any:
     """Return the path of a scenario in the folder of the test, if it exists there."""
     if not isinstance(source, str | Path) or str(source).startswith("bundled:"):
         return source
@@ -526,10 +526,10 @@ def _homes(folder: Path, homes: int | str | Path | Sequence[str | Path] | None) 
     if isinstance(homes, int):
         return {HOME: {"synthetic": homes}}
     names = [homes] if isinstance(homes, str | Path) else list(homes)
-    return {HOME: {"floorplans": [_near(folder, name) for name in names]}}
+    return {HOME: {"floorplans": [_relative_path(folder, name) for name in names]}}
 
 
-def _near(folder: Path, name: str | Path) -> str:
+def _relative_path(folder: Path, name: str | Path) -> str:
     """Return a path or pattern relative to a folder if it exists there, else unchanged."""
     path = folder / name
     return str(path if path.exists() or any(path.parent.glob(path.name)) else Path(name).absolute())

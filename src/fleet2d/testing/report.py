@@ -41,7 +41,7 @@ def write_report(
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}</title><style>{STYLE}</style></head><body>",
         f'<h1>Release gate</h1><p class="verdict {kind}">{title}.</p>',
-        *_says(gate),
+        *_answer_lines(gate),
         *_coverage(gate),
         *_comparison(gate),
         *_failures(gate, hints, pictures),
@@ -52,7 +52,7 @@ def write_report(
     write_file(path, "\n".join(parts).encode())
 
 
-def _says(gate: Gate) -> Iterator[str]:
+def _answer_lines(gate: Gate) -> Iterator[str]:
     """Yield the sentences of the answer after the verdict."""
     items = map(html.escape, answer(gate).sentences[1:])
     yield f"<ul>{''.join(f'<li>{item}</li>' for item in items)}</ul>"

@@ -333,7 +333,7 @@ class FailureSearch(TaskQueue):
             question: The question that the search answers.
             took: How long it took, in words.
         """
-        words = self._found() if self.failures else self._missed()
+        words = self._failure_sentences() if self.failures else self._no_failure_sentences()
         lost = [f"{n} runs could not be done: {error}." for error, n in self.errors.items()]
         cost = f"It took {counted(self.tries, 'run')} in {took}."
         table = [
@@ -348,7 +348,7 @@ class FailureSearch(TaskQueue):
         ]
         return Conclusion(question, (*words, *lost, cost), tuple(table))
 
-    def _found(self) -> Iterator[str]:
+    def _failure_sentences(self) -> Iterator[str]:
         tries: dict[str, list[str]] = {}
         for failure in self.failures:
             tries.setdefault(failure.what, []).append(str(failure.number))
@@ -357,7 +357,7 @@ class FailureSearch(TaskQueue):
         if never := self.never_failed():
             yield f"Never failed: {'; '.join(never)}."
 
-    def _missed(self) -> Iterator[str]:
+    def _no_failure_sentences(self) -> Iterator[str]:
         yield f"Nothing fails in {counted(self.tries, 'run')}."
         lost = sum(self.errors.values())
         blind = min(self._random, self.tries) - lost

@@ -69,11 +69,11 @@ def view(
     if live.failure is not None:
         raise live.failure
     assert live.run is not None
-    typer.echo(_where(live.run), err=True)
+    typer.echo(_closing_line(live.run), err=True)
     raise typer.Exit(130)
 
 
-def _where(run: "Run") -> str:
+def _closing_line(run: "Run") -> str:
     """Return a line that says how a run that was watched ended, and where it is."""
     if run.directory is None:
         return f"the run is {run.status}; it is not stored: name a directory by --out"
@@ -103,5 +103,5 @@ def _view_runs(
     server = PageServer(sources, port=port, seen_at=seen_at)
     server.show(open_browser=browser, announce=typer.echo)
     for run in server.end_branches():
-        typer.echo(_where(run), err=True)
+        typer.echo(_closing_line(run), err=True)
     raise typer.Exit(130)

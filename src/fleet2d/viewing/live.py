@@ -61,13 +61,13 @@ class LiveEngine:
             y=int(actor.state.y),
             heading=int(actor.state.heading) % TURN,
             away=bool(actor.state.away),
-            ahead=self._ahead(actor),
+            ahead=self._path_ahead(actor),
             behavior=behavior,
             reason=reason,
             decides=-1 if actor.asked_at is None else actor.asked_at,
         )
 
-    def _ahead(self, actor: Any) -> list[tuple[int, int, int]]:
+    def _path_ahead(self, actor: Any) -> list[tuple[int, int, int]]:
         """Return the corners of the path ahead: time [us], x and y [lattice]."""
         if not isinstance(actor.motion, Track):
             return []
@@ -154,11 +154,11 @@ class LiveEngine:
         if order["action"] == "door":
             self.simulation.do(OpenDoor(name) if order["value"] else ShutDoor(name))
         elif order["action"] == "place":
-            self.simulation.do(Put(name, self._near(name, place)))
+            self.simulation.do(Put(name, self._free_place(name, place)))
             if name in self._called:
                 self.simulation.do(HoldStill(name))
         elif order["action"] == "call":
-            self.simulation.do(Send(name, self._near(name, place)))
+            self.simulation.do(Send(name, self._free_place(name, place)))
             self._called.add(name)
         elif order["action"] == "replan":
             self.simulation.do(Replan(name))
@@ -169,7 +169,7 @@ class LiveEngine:
         else:
             raise InputError(f"there is no intervention {order['action']!r}")
 
-    def _near(self, name: str, place: tuple[float, float]) -> tuple[float, float]:
+    def _free_place(self, name: str, place: tuple[float, float]) -> tuple[float, float]:
         """Return the free place for a body that is nearest to a point [m].
 
         Raises:
@@ -273,7 +273,7 @@ class LiveRun:
             self._frame = {**self._frame, "message": f"the simulation failed: {error}"}
         finally:
             self.run = self.engine.simulation.finish()
-            self._frame = {**self._without_news(), "served_as": self.serve(self.run)}
+            self._frame = {**self._frame_without_events(), "served_as": self.serve(self.run)}
             self._send(self._frame)
 
     def _advance(self) -> None:
@@ -354,7 +354,7 @@ class LiveRun:
         )
         return self._frame
 
-    def _without_news(self) -> LiveFrame:
+    def _frame_without_events(self) -> LiveFrame:
         return {**self._frame, "events": [], "marks": [], "slows": []}
 
     def _send(self, frame: LiveFrame) -> None:
@@ -368,7 +368,7 @@ class LiveRun:
         watcher: queue.Queue[LiveFrame] = queue.Queue()
         with self._lock:
             self._watchers.append(watcher)
-            watcher.put(self._without_news())
+            watcher.put(self._frame_without_events())
         try:
             while not (self._is_ending or self._streams_end):
                 frames = []

@@ -133,9 +133,9 @@ def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
     clock = run.clock
     unseen: list[tuple[timedelta, int, str]] = []
     nights: list[tuple[float, int, str]] = []
-    for user, own in of_user.items():
-        unseen += _unseen(clock, user, own)
-        nights += _nights(clock, user, own)
+    for user, user_events in of_user.items():
+        unseen += _unseen(clock, user, user_events)
+        nights += _nights(clock, user, user_events)
     if unseen and any(event.event == EventKind.USER_SEEN for event in events):
         lasted, step, user = max(unseen)
         if lasted >= LEAST_UNSEEN:
@@ -148,14 +148,14 @@ def _people(run: Run, events: Sequence[StoredEvent]) -> Iterator[StoryFacts]:
 
 
 def _unseen(
-    clock: Clock, user: str, own: Sequence[StoredEvent]
+    clock: Clock, user: str, user_events: Sequence[StoredEvent]
 ) -> Iterator[tuple[timedelta, int, str]]:
     """Yield how long a user was out of view, awake and at home, and since when."""
     is_asleep = True  # until the first activity
     is_out = False
     seen_by = 0
     since: int | None = None
-    for event in own:
+    for event in user_events:
         if event.event in SIGHTINGS:
             seen_by += 1 if event.event == EventKind.USER_SEEN else -1
         elif event.event == EventKind.ACTIVITY:
@@ -174,10 +174,10 @@ def _unseen(
 
 
 def _nights(
-    clock: Clock, user: str, own: Sequence[StoredEvent]
+    clock: Clock, user: str, user_events: Sequence[StoredEvent]
 ) -> Iterator[tuple[float, int, str]]:
     """Yield when a user went to bed, in hours since the evening began: once a night, to sleep."""
-    activities = [event for event in own if event.event == EventKind.ACTIVITY]
+    activities = [event for event in user_events if event.event == EventKind.ACTIVITY]
     nights = set()
     for event, following in pairwise(activities):
         lasts = timedelta(microseconds=(following.step - event.step) * clock.step_us)

@@ -72,14 +72,14 @@ def fit_routine(  # noqa: PLR0913 - each is an option
         out: The file of the persona.
         layout: The log's layout; "auto" recognizes it.
         picture: The file of a picture that compares it with the log; None: no picture.
-        seed: The seed of the days that are sampled to compare.
+        seed: The seed of the days that are sampled for the comparison.
         sort: Sort lines of the log whose time runs backwards.
-        rooms: The kinds of rooms of some labels, like `M003=bedroom`; nothing leaves them out.
+        rooms: The kinds of rooms of some labels, like `M003=bedroom`; `M003=` leaves a label out.
         gap: Silence longer than this is unknown.
-        still: Silence in one room up to this is not.
+        still: Silence in one room up to this long counts as a stay.
         id: The person, of a log with several.
         time_zone: The time zone of the home, if times have an offset.
-        private: Make new days of those of the log, so that the persona can be given to others.
+        private: Draw new days that are like those of the log, so that the persona can be shared.
 
     Raises:
         LogError: The log can't be read, is of positions, or has too few days.

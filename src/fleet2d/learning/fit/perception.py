@@ -266,7 +266,7 @@ class Calibration:
         right = []
         mistaken = []
         for place in map(_short, np.linspace(0, farthest, rows).tolist()):
-            share = round(_at(estimates, place), 4)
+            share = round(_probability_at(estimates, place), 4)
             right.append([place, share])
             taken_for_others = recognition.mistaken.value * (1 - share)
             mistaken.append([place, int(taken_for_others * 10_000) / 10_000])  # rounded down
@@ -362,7 +362,7 @@ def _shares(counts: dict[str, int]) -> dict[str, float]:
     return shares
 
 
-def _at(estimates: dict[str, ParameterEstimate], distance: float) -> float:
+def _probability_at(estimates: dict[str, ParameterEstimate], distance: float) -> float:
     """Return the probability at a distance."""
     top = estimates["top"].value
     if "distance midpoint" not in estimates:

@@ -212,12 +212,12 @@ class _Fitter:
             for run in (*day.awake, *day.up):
                 by_state[run.state].append(run)
         for state, done in sorted(by_state.items()):
-            self._add(self.names[state], state, takes=_takes(done))
+            self._add(self.names[state], state, takes=_duration_law(done))
         recorded = [_recorded_day(self.timeline, day, self.names) for day in days]
         used = {name for day in recorded for name in day.activities} - set(self.activities)
         for name in sorted(used - {"sleep", "rest"}):  # states that never fill most of a minute
             state = self.names.index(name)
-            self._add(name, state, takes=_takes([Stretch(state, 0, 1)]))
+            self._add(name, state, takes=_duration_law([Stretch(state, 0, 1)]))
         return recorded
 
     def sleep(self) -> None:
@@ -235,10 +235,10 @@ class _Fitter:
         self._add("rest", state, takes="15 min")
 
     def _add(self, name: str, state: int, **fields: Any) -> None:
-        self.activities[name] = self._where(state) | fields
+        self.activities[name] = self._place_fields(state) | fields
         self.states[name] = state
 
-    def _where(self, state: int) -> dict[str, Any]:
+    def _place_fields(self, state: int) -> dict[str, Any]:
         activity, place = self.timeline.states[state]
         if place == AWAY:
             return {"away": True}
@@ -295,7 +295,7 @@ def _time_by_state(done: Iterable[Stretch]) -> Counter[int]:
     return lasts
 
 
-def _takes(done: Sequence[Stretch]) -> dict[str, Any]:
+def _duration_law(done: Sequence[Stretch]) -> dict[str, Any]:
     """Return the measured law of durations, as quantiles at even steps from 0 to 1."""
     lengths = np.log(np.sort([float(run.length) for run in done]))
     count = min(max(2, 2 * len(lengths) - 1), QUANTILES)

@@ -139,7 +139,7 @@ def _draw(days: Sequence[RecordedDay], draws: Draws) -> RecordedDay:
     episodes = draw_recorded(recording, first, draws, end)
     if episodes[-1].activity != SLEEP:
         episodes.append(Episode(SLEEP, episodes[-1].end, end))
-    now = episodes[0].begin + _within(draws, WAKE_SHIFT_S)
+    now = episodes[0].begin + _random_shift(draws, WAKE_SHIFT_S)
     begins = []
     names = []
     for episode in episodes:
@@ -153,13 +153,13 @@ def _length(episode: Episode, shift: int, draws: Draws) -> int:
     """Return another length [s] of an episode that begins `shift` seconds later than recorded."""
     length = episode.end - episode.begin
     most = max(1, min(LENGTH_SHIFT_S, int(LENGTH_SHIFT * length)))
-    change = _within(draws, most)
+    change = _random_shift(draws, most)
     if abs(shift) > MAX_SHIFT_S:
         change = -abs(change) if shift > 0 else abs(change)
     return max(1, length + change)
 
 
-def _within(draws: Draws, most: int) -> int:
+def _random_shift(draws: Draws, most: int) -> int:
     """Draw a whole number from -most to most, but 0."""
     value = draws.below(2 * most) - most
     return value + 1 if value >= 0 else value

@@ -98,7 +98,7 @@ def read_timeline(
         log: The log.
         rooms: The kind of room of some of its labels, or away, or door; "" leaves them out.
         gap: A longer silence is unknown.
-        still: Silence in one room up to this is not.
+        still: Silence in one room up to this long counts as a stay.
 
     Raises:
         LogError: The state is unknown for most of the time, or the log has no such label.

@@ -36,7 +36,7 @@ EQUAL = 0.0005
 FOLDS = 3
 SAMPLED = 700  # the number of days drawn from a persona, whole weeks
 CHAIN_DAYS = 140  # the number of days drawn from the chain
-# Both numbers where seconds are compared.
+# The numbers of days from the persona and from the chain where seconds are compared.
 SAMPLED_BY_SECOND = 140
 CHAIN_DAYS_BY_SECOND = 7
 

@@ -104,7 +104,7 @@ def table(study: Study, task: str) -> str:
     """Return the table of a task in Markdown: scores, and differences to real days."""
     metric = headline(task)
     means = study.summary(metric, ["task", "learner", "days", "arm"]).filter(task=task)
-    pairs = compared(study, task, REFERENCE) if _has(study, task, REFERENCE) else None
+    pairs = compared(study, task, REFERENCE) if _has_arm(study, task, REFERENCE) else None
     head = ["learner", "own days", "arm", "homes", metric.replace("_", " ")]
     head += [f"difference to {REFERENCE} (95 % over homes)", "better in"]
     head += ["difference in log loss (95 % over the days of these homes)"]
@@ -119,7 +119,7 @@ def table(study: Study, task: str) -> str:
     return markdown_table(head, rows)
 
 
-def _has(study: Study, task: str, arm: str) -> bool:
+def _has_arm(study: Study, task: str, arm: str) -> bool:
     """Return whether another arm was tested beside one."""
     import polars as pl
 
@@ -150,7 +150,7 @@ def sentences_of(study: Study, task: str) -> list[str]:
     learner = study.complete["learner"][0]
     found = []
     for against, arm in ((REFERENCE, "both"), ("own", "fitted")):
-        if not (_has(study, task, against) and _has(study, task, arm)):
+        if not (_has_arm(study, task, against) and _has_arm(study, task, arm)):
             continue
         rows = compared(study, task, against).filter(arm=arm, learner=learner).to_dicts()
         if rows:
