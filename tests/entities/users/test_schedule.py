@@ -360,3 +360,15 @@ def test_all_items_that_were_due_on_the_way_over_midnight_come_in_order():
         speed=0.2,
     )
     assert ["bed", "first", "second"] == table(run(content), "events")["detail"].tolist()
+
+
+@pytest.mark.parametrize(("activity", "is_noted"), [("", True), ("cook", False)])
+def test_an_activity_that_goes_on_where_an_item_has_none_is_noted(activity, is_noted):
+    """Who slept until eight slept on in the kitchen, and nobody was told."""
+    sleeps = {"at": "00:00", "place": "bedroom", "activity": "sleep"}
+    cooks = {"at": "08:00", "place": "kitchen", "activity": activity}
+    out = {"at": "09:00", "away": True}
+    stored = run(one(agenda(sleeps, cooks, out)))
+
+    notes = stored.manifest["notes"]
+    assert is_noted == any("has no activity" in note for note in notes)

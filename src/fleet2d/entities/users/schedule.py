@@ -27,7 +27,7 @@ class Item(Settings):
         place: The place: a room, a kind of room, or a point.
         away: Whether the person is out of the home instead.
         dwell: The duration; left out: until the next item begins.
-        activity: The activity there, for the events table.
+        activity: The activity there, for the events table; left out: that of the item before.
     """
 
     at: TimeOfDay | None = None
@@ -127,6 +127,12 @@ class Schedule(Behavior):
         available = {(), *available_places(actor, "schedule.days", places)}
         for day in self.week:
             day[:] = [entry for entry in day if entry.place in available]
+        at_home = [entry.activity for entry in chain.from_iterable(self.week) if entry.place]
+        if any(at_home) and not all(at_home):
+            actor.notes.append(
+                "schedule.days: where an item at home has no activity, that of the item before goes"
+                " on, such as sleep: give each of them one"
+            )
 
     def begins_at(self, time: datetime) -> RoomChoice | Point | tuple[()] | None:
         """Return the place of the last item before the run."""
