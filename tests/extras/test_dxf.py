@@ -148,6 +148,25 @@ def test_a_drawing_without_a_unit_and_doors_is_refused_with_the_sizes(tmp_path):
         load_floorplan(tmp_path / "plan.dxf")
 
 
+def test_what_is_not_read_on_the_layers_of_walls_is_told(tmp_path):
+    """A home whose inner walls were hatched had none of them, without a word."""
+    path = write(tmp_path)
+    drawing = ezdxf.readfile(path)
+    for on in ("A-WALL", "FURNITURE"):
+        hatch = drawing.modelspace().add_hatch(dxfattribs={"layer": on})
+        hatch.paths.add_polyline_path([(1, 1), (2, 1), (2, 2)], is_closed=True)
+    drawing.saveas(path)
+
+    note = "left out on the layers of walls: 1 HATCH; exploded, they are lines"
+    assert note in load_floorplan(path).notes
+
+    for entity in drawing.modelspace().query("LWPOLYLINE"):
+        drawing.modelspace().delete_entity(entity)
+    drawing.saveas(path)
+    with pytest.raises(FloorPlanError, match="no lines of walls but 1 HATCH: explode them"):
+        load_floorplan(path)
+
+
 def test_layers_that_are_off_or_frozen_draw_no_walls(tmp_path):
     path = write(tmp_path)
     seen = load_floorplan(path)
@@ -177,14 +196,18 @@ def test_walls_in_blocks_of_blocks_are_walls(tmp_path):
 
 
 @pytest.mark.parametrize("unit_m", [1.0, 0.001])
-@pytest.mark.parametrize("kind", ["circle", "bulges"])
-def test_a_round_column_is_wall(tmp_path, unit_m, kind):
+@pytest.mark.parametrize("kind", ["circle", "bulges", "solid"])
+def test_a_column_is_wall(tmp_path, unit_m, kind):
     path = write(tmp_path, unit_m, {1.0: 6, 0.001: 4}[unit_m])
     area_m2 = load_floorplan(path).area_m2
     drawing = ezdxf.readfile(path)
     x, y, radius = (length / unit_m for length in (2, 2, 0.5))
     if kind == "circle":
         drawing.modelspace().add_circle((x, y), radius, dxfattribs={"layer": "A-WALL"})
+    elif kind == "solid":
+        half = radius * math.sqrt(math.pi) / 2
+        ends = [(x + i * half, y + j * half) for i in (-1, 1) for j in (-1, 1)]
+        drawing.modelspace().add_solid(ends, dxfattribs={"layer": "A-WALL"})
     else:
         ends = [(x - radius, y, 0, 0, 1), (x + radius, y, 0, 0, 1)]
         drawing.modelspace().add_lwpolyline(ends, close=True, dxfattribs={"layer": "A-WALL"})

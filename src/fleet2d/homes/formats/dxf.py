@@ -2,6 +2,7 @@
 
 import re
 from base64 import b64encode
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +34,11 @@ OTHERS = re.compile(
     "dim|text|hatch|furn|m[öo]bel|mobil|door|t[üu]e?r|porte|puerta|axis|grid|defpoints|anno|title",
     re.IGNORECASE,
 )
-DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
+DRAWN = (
+    "LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "SOLID", "TRACE",
+)  # fmt: skip
+# Areas and bodies, which may be walls, but aren't read.
+UNREAD = ("HATCH", "MPOLYGON", "REGION", "3DSOLID", "3DFACE", "MESH", "BODY", "SURFACE")
 # What consists of other entities, and how deeply it may be nested.
 COMPOUND = ("INSERT", "MLINE")
 MAX_NESTED = 8
@@ -93,10 +98,14 @@ class Dxf(FileSource):
             windows = {name for name in layers if WINDOWS.search(name)}
             lines = list(_lines(drawing, layers))
             CORNERS.check(sum(map(len, lines)), "it", FloorPlanError)
+            unread = _unread(drawing, layers)
             if not lines:
+                found = f" but {unread}: explode them, or" if unread else ":"
                 raise FloorPlanError(
-                    "it has no lines of walls: name their layers by floorplan.walls"
+                    f"it has no lines of walls{found} name their layers by floorplan.walls"
                 )
+            if unread:
+                notes.append(f"left out on the layers of walls: {unread}; exploded, they are lines")
             arcs = _door_arcs(drawing)
             scales = [self.scale] if self.scale else _scales(drawing, lines, arcs)
             plans: list[tuple[float, FloorPlan]] = []
@@ -176,6 +185,13 @@ def _lines(drawing: Any, layers: set[str]) -> Iterator[F64]:
             corners = np.array(points, np.float64).reshape(-1, 2)
             if len(corners) > 1 and np.isfinite(corners).all():
                 yield corners
+
+
+def _unread(drawing: Any, layers: set[str]) -> str:
+    """Return the number of each kind of entity on some layers that isn't read, as text."""
+    parts = _parts(drawing, drawing.modelspace(), frozenset())
+    kinds = Counter(part.dxftype() for part, of_part in parts if of_part & layers)
+    return ", ".join(f"{kinds[kind]} {kind}" for kind in UNREAD if kinds[kind])
 
 
 def _parts(
