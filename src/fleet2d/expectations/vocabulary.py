@@ -63,7 +63,7 @@ Target = str | tuple[float, float] | WordSignal
 BODY = ("user or robot", "bodies")
 """A noun for messages, and what it names in `Scene.names`."""
 
-# The charge of a battery is rounded down to thousandths, unless it is below by a rounding error.
+# The charge of a battery is rounded down to thousandths, with a tolerance for errors of floats.
 PARTS = 1000
 ROUNDING = 1e-9
 

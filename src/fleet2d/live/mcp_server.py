@@ -260,7 +260,8 @@ class Workspace:
             limit: The number of rows that are shown, 200 at most; all are counted.
 
         Raises:
-            InputError: There is no such run, table, column or value, or the query takes too much.
+            InputError: There is no such run, table, column or value, or the query takes too long or
+                too much memory.
         """
         tables = self._open(run).tables
         if query and (table or where or columns):

@@ -264,7 +264,7 @@ class WebSocketPeer(Peer):
     def close(self, run: Run) -> None:
         """Tell the end to all clients, and disconnect them."""
         end = {"type": "end", "status": run.status, "digest": run.digest}
-        with self._lock:  # for clients that have just connected, too
+        with self._lock:  # clients may be connecting
             self._end = json.dumps(end), None
         self._put(self._end)
         until = time.monotonic() + WAIT_S

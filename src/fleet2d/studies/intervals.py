@@ -32,10 +32,10 @@ RARE = 0.1  # the share of a rare kind of units that a study should include
 ENOUGH_UNITS = math.ceil(math.log(1 - LEVEL) / math.log(1 - RARE))  # include it in 95 %
 MINOR = 0.1  # a level with a smaller share of the variance of the mean may have few units
 ROUNDING = 1e-9  # differences up to here, relative to the values, are rounding errors
-MIN_FREEDOM = 2.0  # below which the skewness of units can't be estimated
+MIN_FREEDOM = 2.0  # with less, the skewness of units can't be estimated
 # The weight of the wider of the two ends, that of Hall and that of Student's t.
 WIDER = 0.75
-MIN_SKEWNESS = 1e-6  # below which Hall's transformation is the identity
+MIN_SKEWNESS = 1e-6  # for a smaller one, Hall's transformation is the identity
 
 
 Limits = tuple[float, float]

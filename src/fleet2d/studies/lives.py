@@ -462,7 +462,7 @@ def _read_table(settings: DrawSettings) -> tuple[list[dict[str, Any]], list[floa
     for row in rows:
         for key, value in row.items():
             if isinstance(value, str) and "." in key and _is_file(file := path.parent / value):
-                row[key] = str(file.absolute())  # such as a log
+                row[key] = str(file.absolute())  # the file of a log
     return rows, ends, frame.columns
 
 

@@ -57,7 +57,7 @@ SLICE_ROWS = 5_000  # variants whose results are in memory at a time
 SCENARIO_ROWS = 1_000  # scenarios that are in memory at a time
 FEW_SETUPS = 8  # for so few, starting workers costs more than it saves
 FLEET_HOMES = 100
-"""Homes of a fleet that are set up before its first run: all of its lives are drawn by one law."""
+"""Homes of a fleet that are set up before its first run, as all lives are drawn alike."""
 
 
 class StudyPlan(NamedTuple):

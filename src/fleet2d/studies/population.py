@@ -99,7 +99,11 @@ class PopulationAxis(Axis, DrawSettings):
         return HOME, name
 
     def choices(self, name: str) -> list[Choice]:
-        """Return all lives, found in this process."""
+        """Refuse a population within another axis.
+
+        Raises:
+            ScenarioError: Always: lives are found by `find_lives`.
+        """
         raise ScenarioError("a population can't be drawn within another axis, or as one of `vary`")
 
 

@@ -223,7 +223,7 @@ class RolloutAnswer:
             metric, look = self.stop
             texts.append(
                 f"It is stopped after {self.date_of(look.day)} by the guard of {metric}: with the"
-                f" change it is {self._words(look)} than without, and {self._allowed(metric)} is"
+                f" change it is {self._words(look)} than without, and {self._bounds(metric)} is"
                 " allowed."
             )
         elif self.settings.guards:
@@ -285,7 +285,7 @@ class RolloutAnswer:
             return f"{size} (how much in all robots can't be told from so few)"
         return f"{size} (difference {look.low:.3g} to {look.high:.3g}, on any day)"
 
-    def _allowed(self, metric: str) -> str:
+    def _bounds(self, metric: str) -> str:
         bounds = self.settings.guards[metric]
         parts = []
         if bounds.most is not None:

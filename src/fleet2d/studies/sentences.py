@@ -195,7 +195,7 @@ class StudyAnswer:
     def __init__(self, study: StudyAnswers) -> None:
         """Make the comparisons that the study asks for, or else one of each axis and metric."""
         self._study = study
-        self.asked = study.comparisons or tuple(self._default())
+        self.asked = study.comparisons or tuple(self._default_comparisons())
         found: list[list[Comparison] | InputError] = []
         for c in self.asked:
             try:
@@ -209,7 +209,7 @@ class StudyAnswer:
             for each in found
         ]
 
-    def _default(self) -> "Iterator[PairedComparison]":
+    def _default_comparisons(self) -> "Iterator[PairedComparison]":
         """Yield the comparisons of a study that names none: by one number of each metric.
 
         That is the first that can be judged: among all numbers, some would differ by chance.

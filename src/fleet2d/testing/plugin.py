@@ -262,7 +262,7 @@ def _trials(test: str, decision: dict[str, Any]) -> "list[TrialReport]":
 def _reason(report: Any) -> str:
     """Return why a test was skipped or couldn't be run, in one line."""
     text = report.longrepr
-    if isinstance(text, tuple):  # of a skipped test: file, line, and reason
+    if isinstance(text, tuple):  # a skipped test has file, line and reason
         return str(text[2]).removeprefix("Skipped: ")
     crash = getattr(text, "reprcrash", None)
     message = str(text if crash is None else crash.message).removeprefix("Failed: ")

@@ -1,4 +1,4 @@
-"""`fleet2d demo`: the bundled scenario, what happened in it in sentences, and its page."""
+"""`fleet2d demo`: the bundled scenario, its events in sentences, and its page."""
 
 import tempfile
 from collections import Counter

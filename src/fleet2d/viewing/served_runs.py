@@ -119,7 +119,7 @@ class ServedRuns:
                 _ = data.tracks
                 _ = data.sightings
                 _ = data.postures
-        release_memory()  # of the tables that were read
+        release_memory()  # tables that were read aren't needed again
 
     def routes(self) -> list[Route]:
         """Return the routes of the data of all runs."""

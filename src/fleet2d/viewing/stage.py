@@ -138,14 +138,14 @@ def _label(axes: Axes, bodies: Sequence[BodyFacts], clock: Clock) -> None:
 
 TAIL = timedelta(minutes=1)  # length of the paths behind bodies
 MIN_RADIUS_M = 0.2
-CIRCLE = directions(np.linspace(0, 2 * np.pi, 48, endpoint=False))  # of radius 1
+CIRCLE = directions(np.linspace(0, 2 * np.pi, 48, endpoint=False))  # a unit circle
 LYING = 2.6  # length of somebody who lies, as a share of the width
 NOSE = 1.6  # length of the line of the heading [radii]
 STRIP_ROWS = 6
 ABOVE_M = 0.6  # space above the plan
 NAME_PT = 8.5
-BOLD_WIDTH = 0.72  # of a bold letter, as a share of its size
-LINE_HEIGHT = 1.2  # as a share of the size of its letters
+BOLD_WIDTH = 0.72  # the width of a bold letter, as a share of its size
+LINE_HEIGHT = 1.2  # a share of the size of the letters
 
 Box = tuple[float, float, float, float]
 """Left, bottom, right and top of a text [m]."""
@@ -196,7 +196,7 @@ def asked_of(run: Run) -> list[AskedTime]:
     """
     events = run.tables["events"]
     asked: list[AskedTime] = []
-    open_ones: dict[str, AskedTime] = {}  # by robot
+    open_ones: dict[str, AskedTime] = {}  # keys are robots
     columns = (events[name].to_pylist() for name in ("step", "entity", "event", "detail"))
     rows = sorted(zip(*columns, strict=True), key=itemgetter(0))
     for step, robot, event, detail in rows:

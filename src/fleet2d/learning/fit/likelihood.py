@@ -174,7 +174,7 @@ class ProductLikelihood:
         limit = float((self.upper if side > 0 else self.lower)[index])
         free = np.ones(len(best.theta), bool)
         free[index] = False
-        theta = best.theta  # the next search starts from that of the last value tried
+        theta = best.theta  # where the next search starts
 
         @cache  # in small logs, another start may end at another maximum
         def excess(value: float) -> float:

@@ -28,7 +28,7 @@ from fleet2d.routines.persona import Persona
 from fleet2d.routines.planner import NO_SLEEP_S, RecordedDay, parse_day, write_day
 from fleet2d.runtime.clock import DAY_S
 
-QUANTILES = 21  # maximum number of quantiles of a law of durations
+QUANTILES = 21  # maximum number of quantiles of a distribution of durations
 # Words in names of activities for standing, lying and sitting; the first match counts.
 STAND = ("cook", "prepar", "wash", "dish", "clean", "transition", "hygiene", "bathing")
 LIE = ("sleep", "nap", "bed", "wake_up")
@@ -212,12 +212,12 @@ class _Fitter:
             for run in (*day.awake, *day.up):
                 by_state[run.state].append(run)
         for state, done in sorted(by_state.items()):
-            self._add(self.names[state], state, takes=_duration_law(done))
+            self._add(self.names[state], state, takes=_duration_quantiles(done))
         recorded = [_recorded_day(self.timeline, day, self.names) for day in days]
         used = {name for day in recorded for name in day.activities} - set(self.activities)
         for name in sorted(used - {"sleep", "rest"}):  # states that never fill most of a minute
             state = self.names.index(name)
-            self._add(name, state, takes=_duration_law([Stretch(state, 0, 1)]))
+            self._add(name, state, takes=_duration_quantiles([Stretch(state, 0, 1)]))
         return recorded
 
     def sleep(self) -> None:
@@ -295,8 +295,8 @@ def _time_by_state(done: Iterable[Stretch]) -> Counter[int]:
     return lasts
 
 
-def _duration_law(done: Sequence[Stretch]) -> dict[str, Any]:
-    """Return the measured law of durations, as quantiles at even steps from 0 to 1."""
+def _duration_quantiles(done: Sequence[Stretch]) -> dict[str, Any]:
+    """Return the measured distribution of durations, as quantiles at even steps from 0 to 1."""
     lengths = np.log(np.sort([float(run.length) for run in done]))
     count = min(max(2, 2 * len(lengths) - 1), QUANTILES)
     at = np.linspace(0, len(lengths) - 1, count)

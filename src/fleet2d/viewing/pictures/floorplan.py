@@ -1,4 +1,4 @@
-"""Pictures of floor plans, with their furniture and what is wrong with them."""
+"""Pictures of floor plans, with their furniture and the findings about them."""
 
 import io
 import math

@@ -164,7 +164,7 @@ def _picture_width(chip: Chip) -> float:
     return CHIP_IN * (1.6 if chip.kind == "way" else 1.0) + 0.06
 
 
-SAMPLES = 40_000  # of short runs; longer runs have a sample a minute
+SAMPLES = 40_000  # samples of a short run; longer ones have one a minute
 SAMPLE_US = 60_000_000
 # A random walk has a leg for each step: all of them would be slow to draw, and no legible picture.
 LEGS = 1_500
@@ -352,7 +352,7 @@ CANDIDATES = 60  # moments to compare when a view is chosen
 MAX_PLACES = 260
 CLEAR_M = 0.5  # twice the space between a name and a robot
 FAR_APART_M = 2.0
-RIM_COLOR = "#ffffffb0"  # around names
+RIM_COLOR = "#ffffffb0"  # the rim of names
 
 
 @dataclass(frozen=True)

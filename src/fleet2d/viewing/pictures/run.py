@@ -208,19 +208,19 @@ MAX_BODIES = 4  # users with an actogram, and robots
 WIDTH = 10.67  # the largest; with a narrow plan the picture is narrower
 EDGE = 0.32
 HEADER = 0.82
-FOOTER = 0.28  # below the last line of the legends
+FOOTER = 0.28  # space below the legends
 GAP = 0.3
-DATES = 0.78  # beside the first actogram
-CAPTION = 0.42  # above each actogram
+DATES = 0.78  # space beside the first actogram
+CAPTION = 0.42  # space above each actogram
 ACTOGRAMS = {0: 0.0, 1: 4.25, 2: 4.9, 3: 5.1, 4: 5.4}
 # Minimum width of the plan with legend and header: alone, beside actograms.
 MIN_LEFT_WIDTHS = (7.2, 3.7)
 MAX_BODY_HEIGHT = 6.6
 MIN_BODY_HEIGHTS = (2.3, 3.4)
 MIN_ROW_HEIGHT = 0.08
-TICKS = 0.24  # below each actogram
+TICKS = 0.24  # space below each actogram
 MAX_ROW_HEIGHT = 0.55
-SCALE_WORDS = 0.2  # below the bar of the scale
+SCALE_WORDS = 0.2  # space below the bar of the scale
 
 SMALL = 7.5
 NOTE = 8.5
