@@ -76,7 +76,7 @@ def read_json(text: bytes) -> Any:
     """Return the content of a JSON text.
 
     Raises:
-        ValueError: It is not JSON, or is nested too deeply.
+        ValueError: The text is not JSON, or is nested too deeply.
 
     Example:
         >>> read_json(b'{"steps": 3}')

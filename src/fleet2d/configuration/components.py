@@ -159,8 +159,8 @@ def once(info: ValidationInfo, key: object, validate: Callable[[], T]) -> T:
         validate: The function that reads and validates it.
 
     Raises:
-        ValueError: It is invalid, which the first entry found; or all that was counted, which
-            counts again for each entry, is beyond a bound.
+        ValueError: The thing is invalid, as the first entry found; or the counts, which each entry
+            adds again, exceed a bound.
     """
     if info.context is None:
         return validate()

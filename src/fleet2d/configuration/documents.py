@@ -106,7 +106,7 @@ def compose(text: str) -> yaml.Node | None:
             _check_events(text, _FastLoader)
         return _composed(_FastLoader(text))
     except yaml.YAMLError as error:
-        if "nesting depth" in str(error):  # of libyaml 0.2.6, which reads ahead of its events
+        if "nesting depth" in str(error):  # libyaml 0.2.6 reads ahead of its events
             _check_events(text, Loader)
         if len(text) > _SLOW_TO_EXPLAIN:
             raise

@@ -331,7 +331,7 @@ class Cameras(Watcher):
 
     @property
     def waits(self) -> bool:
-        """Whether an event of it may end the present span."""
+        """Whether an event of these cameras may end the present span."""
         names = self.event_names
         is_awaited = not self.awaited.isdisjoint(names)
         return is_awaited or not self.owner.plan.interrupts.isdisjoint(names)

@@ -245,7 +245,7 @@ class Clearance(Watcher):
         people = slice(0, len(self._users))
         places = block.x[people], block.y[people], block.away[people]
         for row, robot in self.robots.items():
-            meeting = self._first(robot, poses_of(block, row), places, first, begin=1)
+            meeting = self._first_hit(robot, poses_of(block, row), places, first, begin=1)
             if meeting is not None:
                 end = min(end, first + meeting[0])
             end = min(end, self._next_look(robot, places, first, end))
@@ -291,7 +291,7 @@ class Clearance(Watcher):
         poses = Poses(*np.array([now, then]).T)
         states = np.array([user.state for user in self._users], np.int64)
         x, y, _, away = np.repeat(states[:, :, None], 2, axis=2).swapaxes(0, 1)
-        meeting = self._first(robot, poses, (x, y, away), step, begin=0)
+        meeting = self._first_hit(robot, poses, (x, y, away), step, begin=0)
         return None if meeting is None else self._users[meeting[1]]
 
     def surroundings(self, robot: DecidingActor) -> Surroundings:
@@ -308,7 +308,7 @@ class Clearance(Watcher):
         people = np.array(present, np.int64).reshape(-1, 3)
         return Surroundings(people, np.array(everybody, np.int64), robot.arrangement)
 
-    def _first(
+    def _first_hit(
         self, robot: DecidingActor, poses: Poses, people: Places, first: int, begin: int
     ) -> tuple[int, int] | None:
         """Return the first column from `begin` on at which a robot drives at a user, and which."""

@@ -92,7 +92,8 @@ class RunExpectations(Watcher):
             first: The present step, from which on its signals are measured.
 
         Raises:
-            ScenarioError: It names something unknown or an impossible event, or lasts too long.
+            ScenarioError: The expectation names something unknown or an impossible event, or lasts
+                too long.
             InputError: It has no time, or there is another one of that name.
         """
         expectation = check_judged(expectation)

@@ -8,11 +8,11 @@ from fleet2d.floorplan.home import Home
 from fleet2d.interactions.interaction import REQUEST_EVENTS
 from fleet2d.runtime.events import KINDS, EventKind
 
-# Events of every person: an order can cause them if no behavior does.
+# Every person has these events: an order can cause them if no behavior does.
 PERSON_EVENTS = frozenset(
     {EventKind.ACTIVITY, EventKind.CAME_HOME, EventKind.LEFT_HOME, EventKind.USES}
 )
-# Events of every robot: interventions cause them.
+# Every robot has these events, which interventions cause.
 ROBOT_EVENTS = frozenset(
     {
         EventKind.ALLOWED, EventKind.BANNED, EventKind.CALLED, EventKind.DEADLOCK,

@@ -38,7 +38,7 @@ from fleet2d.floorplan.placed_objects import POSTURES
 from fleet2d.kernels import I8, I32, NOBODY, UNKNOWN_TRUTH
 from fleet2d.runtime.events import HOME, RANKS, Event, EventKind
 
-# Descriptions of columns.
+# These describe columns.
 ANY_ENTITY = "what did it, or what it happened to; none: the home itself"
 TRUTH_KNOWN = "whether it is known who was there: not for what real robots perceived"
 ACTIVITY_SAID = "what the user does, if a behavior says so"

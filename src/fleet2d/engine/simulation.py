@@ -558,7 +558,8 @@ class Simulation:
                 `script`, which may say when by `at` or `on`.
 
         Raises:
-            ScenarioError: It is not valid, names something unknown, or can never happen.
+            ScenarioError: The intervention is not valid, names something unknown, or can never
+                happen.
             PlacementError: There is no such place, or it can't be reached.
             InputError: The run is finished.
 
@@ -642,8 +643,8 @@ class Simulation:
             The name.
 
         Raises:
-            InputError: It names something unknown or an impossible event, or its time is beyond
-                the run.
+            InputError: The expectation names something unknown or an impossible event, or its time
+                is beyond the run.
 
         Example:
             >>> import fleet2d

@@ -184,7 +184,7 @@ def request(state: State, act: Mapping[str, Any] | Intervention, step: int) -> b
         Whether the intervention waits for a later time or an event.
 
     Raises:
-        ScenarioError: It is not valid, names something unknown, or can never happen.
+        ScenarioError: The intervention is not valid, names something unknown, or can never happen.
         PlacementError: There is no such place, or it can't be reached.
     """
     world = EngineWorld(state, step)
@@ -219,8 +219,8 @@ def schedule_script(state: State, entry: Entry, index: int) -> None:
         index: The place of the entry in the script.
 
     Raises:
-        ScenarioError: It names something unknown, its event can never happen, or its time isn't
-            within the run.
+        ScenarioError: The entry names something unknown, its event can never happen, or its time
+            isn't within the run.
         PlacementError: There is no such place, or it can't be reached.
     """
     world = EngineWorld(state, 0)

@@ -167,7 +167,7 @@ class Yielding(Watcher):
             changes = [change for change in self._changes() if change > step]
             until = min([end, *(change for change in changes if change > first)])
             is_same = all(change > first for change in changes)
-            kept = self._present(step) if is_same else self._kept(first)
+            kept = self._present_distances(step) if is_same else self._kept_distances(first)
             found = self._meetings(kept, first, until)
             if found:
                 return min(due for _, due, _, _ in found)
@@ -199,7 +199,7 @@ class Yielding(Watcher):
             end_plan: Called with a row and the step before its plan is replaced.
         """
         self._refresh(step)
-        found = self._meetings(self._present(step), step, step + 1)
+        found = self._meetings(self._present_distances(step), step, step + 1)
         for row, _, at, other in found:
             now = Situation(self._actors[row], step, (), outputs)
             for each, plan in self._plans(now, at, other):
@@ -207,7 +207,7 @@ class Yielding(Watcher):
         # Robots that would still drive into somebody in this step stop, then those that would hit
         # them.
         while found:
-            found = self._meetings(self._strict(step), step, step + 1)
+            found = self._meetings(self._strict_distances(step), step, step + 1)
             for row, *_ in found:
                 now = Situation(self._actors[row], step, (), outputs)
                 self._follow(now, self._stop(now), begun, end_plan)
@@ -252,15 +252,15 @@ class Yielding(Watcher):
             if gives_way is not None:  # `Clearance` handles people that stand
                 self._counts[number, people] = OTHERS_MOTION
                 self._polite[number, people] = lattice(gives_way.distance)[number, people]
-        self._passing = self._each(self._near, self._nothing)
-        self._politely = self._each(self._polite, self._nothing)
-        self._everybody = self._each(self._near, self._hard)
+        self._passing = self._distances_by_row(self._near, self._nothing)
+        self._politely = self._distances_by_row(self._polite, self._nothing)
+        self._everybody = self._distances_by_row(self._near, self._hard)
         self._same_place = SAME_PLACE_M * units
         self._order()
         for row in self.rows:
             self._begin_apart(actors[row])
 
-    def _each(self, near: I64, hard: I64) -> dict[int, Distances]:
+    def _distances_by_row(self, near: I64, hard: I64) -> dict[int, Distances]:
         """Return the distances of each robot from all bodies, whoever moves, by row."""
         nothing = self._nothing[:1]
         counts = np.zeros_like(self._counts[:1])
@@ -290,7 +290,7 @@ class Yielding(Watcher):
             self._distances = None
             self._without_patience = None
 
-    def _present(self, step: int) -> Distances:
+    def _present_distances(self, step: int) -> Distances:
         """Return the distances that robots keep from all bodies at a step."""
         may_end = self._patience or self._pauses or self._swapped
         if self._distances is not None and not may_end:
@@ -307,12 +307,12 @@ class Yielding(Watcher):
                 del self._swapped[pair]
                 self._distances = None
         if self._distances is None:
-            self._distances = self._kept(step)
+            self._distances = self._kept_distances(step)
         return self._distances
 
-    def _kept(self, step: int) -> Distances:
+    def _kept_distances(self, step: int) -> Distances:
         """Return the distances that robots keep at a step if nobody decides before it."""
-        usual = self._usual(step)
+        usual = self._usual_distances(step)
         lead = usual.lead.copy()
         near = usual.near.copy()
         hard = usual.hard.copy()
@@ -338,7 +338,7 @@ class Yielding(Watcher):
                 lead[number] = -1
         return Distances(lead, near, hard, counts)
 
-    def _usual(self, step: int) -> Distances:
+    def _usual_distances(self, step: int) -> Distances:
         """Return the distances that robots keep at a step without patience."""
         swapped = self._swapped_at(step)
         if self._without_patience is None or self._without_patience[0] != swapped:
@@ -369,9 +369,9 @@ class Yielding(Watcher):
         """Return the pairs of robots whose order is swapped at a step."""
         return [pair for pair, until in self._swapped.items() if until > step]
 
-    def _strict(self, step: int) -> Distances:
+    def _strict_distances(self, step: int) -> Distances:
         """Return the distances at which robots stop at the last moment."""
-        lead = self._present(step).lead
+        lead = self._present_distances(step).lead
         if self._strictest is None or self._strictest[0] is not lead:
             strict = Distances(np.minimum(lead, 0), self._least, self._nothing, self._alone)
             self._strictest = lead, strict
@@ -379,7 +379,7 @@ class Yielding(Watcher):
 
     def _goes_first(self, row: int, other: int, step: int) -> bool:
         """Return whether a robot only has to stop before another one, and needn't yield."""
-        counts = self._present(step).counts
+        counts = self._present_distances(step).counts
         return other in self._number and bool(counts[self._number[row], other] == OWN_MOTION)
 
     def _have_patience(
@@ -412,7 +412,7 @@ class Yielding(Watcher):
         row = now.actor.row
         if self._goes_first(row, other, now.step):
             if self._rests(other, now.step):
-                round_it = self._by_waiting(now, at, other)
+                round_it = self._plan_by_waiting(now, at, other)
                 if round_it is not None:
                     return [(now, self._noted(now, other, round_it))]
             # A shorter time than the other one looks ahead would never let it get away.
@@ -420,22 +420,22 @@ class Yielding(Watcher):
             return [(now, self._blocked(now, at, other, stop))]
         stays = self._hit_at_rest(now, self._everybody[row])
         if stays is None:
-            plan = self._by_waiting(now, at, other)
+            plan = self._plan_by_waiting(now, at, other)
         elif self._keeps_its_place(now, at, other):
             return []
-        elif (passing := self._passed(now, at, other)) is not None:
+        elif (passing := self._plan_passing(now, at, other)) is not None:
             return [passing]
         else:
-            plan = self._aside(now, at, self._politely[row])
+            plan = self._plan_aside(now, at, self._politely[row])
             if plan is None and self._counts[self._number[row]].any():  # then less politely
-                plan = self._aside(now, at, self._passing[row])
+                plan = self._plan_aside(now, at, self._passing[row])
         if plan is None:
-            plan = self._in_vain(now, at, other, stays)
+            plan = self._plan_in_vain(now, at, other, stays)
         else:
             plan = self._noted(now, other, plan)
         return [] if plan is None else [(now, plan)]
 
-    def _in_vain(
+    def _plan_in_vain(
         self, now: Situation, at: int, other: int, stays: tuple[int, int] | None
     ) -> Plan | None:
         """Return the plan of a robot that can only stop; None to go on."""
@@ -448,7 +448,7 @@ class Yielding(Watcher):
             self._have_patience(now, other, max(pause, at - now.step))
             return None
         if is_hit:
-            return self._overlapping(now, pause)
+            return self._plan_when_hit(now, pause)
         self._have_patience(now, other, pause)
         planned_at = self._actors[other].planned_at
         self._pauses[actor.row] = Patience(now.step + pause, planned_at, other)
@@ -458,9 +458,9 @@ class Yielding(Watcher):
             self._waits[actor.row] = wait._replace(pause=pause)
         return plan
 
-    def _by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
+    def _plan_by_waiting(self, now: Situation, at: int, other: int) -> Plan | None:
         """Return a plan that goes on later, or round bodies that stand; None if none is free."""
-        plan = self._past(now, at, other, self._tries)
+        plan = self._plan_past(now, at, other, self._tries)
         if plan is not None:
             return plan
         actor = self._actors[now.actor.row]
@@ -478,7 +478,7 @@ class Yielding(Watcher):
         self._looked_round[actor.row] = now.step, None if around is not None else seen
         return None
 
-    def _past(self, now: Situation, at: int, other: int, waits: I64) -> Plan | None:
+    def _plan_past(self, now: Situation, at: int, other: int, waits: I64) -> Plan | None:
         """Return a plan to go on past a body, later or by a point beside it; None without one."""
         actor = self._actors[now.actor.row]
         number = self._number[actor.row]
@@ -492,20 +492,20 @@ class Yielding(Watcher):
         )
         kept = self._politely[actor.row]
         continued = self._bodies.timelines.way_past(
-            yielder(actor, self._beat_us), now.step, at, in_way, waits, kept, self._far(now)
+            yielder(actor, self._beat_us), now.step, at, in_way, waits, kept, self._free_until(now)
         )
         return None if continued is None else plan_along(now, actor.plan, continued)
 
-    def _passed(self, now: Situation, at: int, other: int) -> tuple[Situation, Plan] | None:
+    def _plan_passing(self, now: Situation, at: int, other: int) -> tuple[Situation, Plan] | None:
         """Return a plan to pass a standing robot with the right of way; None if it can't."""
         row = now.actor.row
         if other not in self._number or not self._rests(row, now.step):
             return None
         theirs = Situation(self._actors[other], now.step, (), now.outputs)
-        plan = self._past(theirs, at, row, NO_WAITS)
+        plan = self._plan_past(theirs, at, row, NO_WAITS)
         return None if plan is None else (theirs, self._noted(theirs, row, plan))
 
-    def _aside(self, now: Situation, at: int, kept: Distances) -> Plan | None:
+    def _plan_aside(self, now: Situation, at: int, kept: Distances) -> Plan | None:
         """Return a plan to step aside and come back, by the nearest place; None without one.
 
         If it can't come back, it waits for the known time, and then looks again.
@@ -525,7 +525,7 @@ class Yielding(Watcher):
         body = yielder(actor, self._beat_us)
         waits = self._tries_aside
         rests = self._free_for
-        until = self._far(now)
+        until = self._free_until(now)
         way_aside = self._bodies.timelines.way_aside
         continued = way_aside(body, now.step, at, aside, waits, rests, kept, until)
         return None if continued is None else plan_along(now, actor.plan, continued)
@@ -546,7 +546,7 @@ class Yielding(Watcher):
         last = 0 if wait is None or not self._goes_on(wait, now) else wait.pause
         return min(max(self._steps(PAUSE), 2 * last), self._steps(LONGEST_PAUSE))
 
-    def _overlapping(self, now: Situation, pause: int) -> Plan | None:
+    def _plan_when_hit(self, now: Situation, pause: int) -> Plan | None:
         """Note once who walks into a robot now; the robot goes on, ignoring them."""
         hits = self._hits(now)
         for other in hits:
@@ -648,14 +648,14 @@ class Yielding(Watcher):
             actor.behaviors[actor.arbiter.active].give_up(now)
         return now.plan().stay(stands).note(EventKind.GIVES_UP, name)
 
-    def _far(self, now: Situation) -> int:
+    def _free_until(self, now: Situation) -> int:
         """Return the step up to which a plan has to be free."""
         return now.step + self._free_for
 
     def _hit_at_rest(self, now: Situation, kept: Distances) -> tuple[int, int] | None:
         """Return the step at which somebody would come too near to a standing robot, and who."""
         row = now.actor.row
-        met = self._bodies.timelines.meeting_at_rest(row, kept, now.step, self._far(now))
+        met = self._bodies.timelines.meeting_at_rest(row, kept, now.step, self._free_until(now))
         return None if met[0] < 0 else met
 
     def _is_free(self, now: Situation, plan: Plan) -> bool:
@@ -666,7 +666,7 @@ class Yielding(Watcher):
         row = now.actor.row
         on = motion.breakpoints
         kept = self._politely[row]
-        step, _ = self._bodies.timelines.meeting_on(row, on, kept, now.step, self._far(now))
+        step, _ = self._bodies.timelines.meeting_on(row, on, kept, now.step, self._free_until(now))
         return step < 0
 
     def _rests(self, row: int, step: int) -> bool:

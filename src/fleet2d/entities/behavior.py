@@ -507,7 +507,7 @@ class Actor(Body):
         return self.off_for is not None
 
     def banned(self, step: int) -> frozenset[int]:
-        """Return the rooms, by index, and areas from which it is banned at a step."""
+        """Return the rooms, by index, and areas from which the body is banned at a step."""
         bans = (room for room, until in self.bans.items() if until > step)
         return self.forbidden.union(self.ruled, bans)
 

@@ -324,7 +324,7 @@ class LeaveRoom:
         self._has_tried = True
         plan = now.plan().note(EventKind.WITHDRAWS, self.about)
         room = now.room
-        if room is None or room.index not in banned:  # it is in a drawn area
+        if room is None or room.index not in banned:  # the ban is of a drawn area
             outside = actor.space_without(banned).nearest(*plan.position)
             if outside is not None and plan.reaches(*outside):
                 plan.go_to_point(*outside)
@@ -584,7 +584,7 @@ class DecidingActor(Actor):
         waiting = self.waiting
         self.waiting = None
         if waiting is not None:
-            self._waited = waiting.since, waiting.look_before(step) + self._just_waited
+            self._waited = waiting.since, waiting.look_before(step) + self._continuation_steps
         if plan is None and waiting is not None and not now.events:
             plan = waiting.continued(now)
         with blame(self.path, step):
@@ -620,7 +620,7 @@ class DecidingActor(Actor):
         return "" if active is None else self.behaviors[active].type_name, note
 
     @property
-    def _just_waited(self) -> int:
+    def _continuation_steps(self) -> int:
         """The steps after a wait within which another one counts as its continuation."""
         from fleet2d.entities.giving_way import REPEATED_WAIT  # few robots need it
 
@@ -637,7 +637,7 @@ class DecidingActor(Actor):
         from fleet2d.entities.giving_way import WaitForPeople
 
         step = now.step
-        just = self._just_waited
+        just = self._continuation_steps
         since = self._waited[0] if step <= self._waited[1] else step
         wait = WaitForPeople(self.plan, step, since, self.arbiter.own, surroundings)
         people = surroundings.people

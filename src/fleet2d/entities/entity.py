@@ -86,7 +86,7 @@ class LiveDetections(EvidenceSource):
         self._rows: list[I64] = []
 
     def receive(self, rows: I64) -> None:
-        """Add sightings of one step, not before that of any earlier call."""
+        """Add sightings of one step, in the order of steps."""
         self._rows.append(rows)
 
     def sightings(self, first: int, end: int) -> I64:

@@ -138,9 +138,9 @@ class Steering:
         for begin_us in range(0, duration_us, PIECE_US):
             end_us = min(begin_us + PIECE_US, duration_us)
             seconds = (end_us - begin_us) / 1e6
-            velocity = self.first.velocity.towards(wanted, _gained(body, end_us))
+            velocity = self.first.velocity.towards(wanted, _speed_change(body, end_us))
             turn = round(velocity.turn_deg * seconds * TURN * FINE / 360)
-            dx, dy = _turned(velocity, seconds * units, (heading + turn // 2) // FINE)
+            dx, dy = _rotated_way(velocity, seconds * units, (heading + turn // 2) // FINE)
             x += dx
             y += dy
             heading += turn
@@ -187,14 +187,14 @@ def _length(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)
 
 
-def _gained(body: Body, time_us: int) -> float:
+def _speed_change(body: Body, time_us: int) -> float:
     """Return the largest change of a robot's speed in a time [m/s]."""
     if not isinstance(body.drive, Trapezoidal):
         return math.inf
     return body.drive.acceleration * time_us / 1e6
 
 
-def _turned(velocity: Velocity, scale: float, heading: int) -> tuple[int, int]:
+def _rotated_way(velocity: Velocity, scale: float, heading: int) -> tuple[int, int]:
     """Return a way of `scale` lattice units for each m/s, in the frame of the home [1/FINE]."""
     ahead = round(velocity.forward * scale * FINE)
     across = round(velocity.left * scale * FINE)

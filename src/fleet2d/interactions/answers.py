@@ -154,7 +154,7 @@ class ActivityPart(AnswerPart):
     loads: dict[str, float] = Field(default={})
 
     def logit(self, now: Circumstances, state: AttitudeState) -> float:
-        """Take off the load of the activity."""
+        """Subtract the load of the activity."""
         return self.base - self.loads.get(now.activity, LOADS.get(now.activity, 0.0))
 
 
@@ -517,14 +517,14 @@ class Answers(Component):
         if notices >= self.chance("notice", now, state):
             return None
         willingness = self.chance("available", now, state)
-        delay = _between(ANSWER_TAKES, slow)
+        delay = _interpolated(ANSWER_TAKES, slow)
         woke = now.activity in ASLEEP
         if available < willingness and accepts < self.chance("accept", now, state):
             return Reply(Outcome.ACCEPTED, delay, willingness=willingness)
         if (outcome := self.complaint(state, now.room, urgency(now.interaction))) is None:
             mild = Outcome.DEFERRED if defers < self.defers and not woke else Outcome.IGNORED
             outcome = Outcome.DECLINED if available < willingness else mild
-        later = _between(self.later, late)
+        later = _interpolated(self.later, late)
         return Reply(outcome, delay, later, willingness, woke)
 
     def complaint(self, state: AttitudeState, room: str, urgent: float = 0.0) -> Outcome | None:
@@ -549,7 +549,7 @@ class Answers(Component):
         return state.trust < self.gives_up_below
 
 
-def _between(limits: tuple[timedelta, timedelta], share: float) -> timedelta:
+def _interpolated(limits: tuple[timedelta, timedelta], share: float) -> timedelta:
     """Return a duration between two, interpolated by a share, in whole seconds."""
     low, high = limits
     return timedelta(seconds=round((low + (high - low) * share).total_seconds()))

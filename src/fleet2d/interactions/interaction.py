@@ -179,7 +179,7 @@ class Request:
         return f"{self.name} {self.to}"
 
     def value_at(self, time: datetime) -> float:
-        """Return its value if it is carried out at a time."""
+        """Return the value of the request if carried out at a time."""
         return self.interaction.value_after(time - self.since)
 
 

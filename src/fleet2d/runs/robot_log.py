@@ -61,7 +61,7 @@ _LEVELS = {
 }  # fmt: skip
 # For these reasons a robot goes off without anybody wanting it.
 _UNWANTED = frozenset({"crash", "empty"})
-# A robot can't notice deceived cameras, nor other interventions than these.
+# Of interventions, a robot can only notice these.
 _FAULTS = frozenset({"fault", "switch_off"})
 _FIELDS_OF_RECORDS = frozenset({"do", "step", "entity", "by", "duration"})
 # Sources in order within a step: causes of a decision come before it, its effects after it.

@@ -251,7 +251,7 @@ def _keys_of(run: "Run", plan: FloorPlan, entity: str) -> dict[str, Any]:
 def _walker(
     run: "Run", plan: FloorPlan, entity: str, clock: Clock
 ) -> "tuple[Home, Actor, Meander]":
-    """Return the home, the body and its behavior that repeats its random walk."""
+    """Return the home, the body, and the behavior that repeats the random walk."""
     sections = run.manifest["scenario"]
     from fleet2d.entities.behavior import Actor  # few paths have walks
     from fleet2d.entities.meander import Meander

@@ -1,4 +1,4 @@
-"""Programs of other languages that take part in a run over pipes: started, timed, ended and blamed.
+"""Programs of other languages that take part in a run over pipes, with time limits and errors.
 
 A message is a line of JSON, ended by a newline. It may be followed by blocks of bytes, whose names
 and sizes its key `blocks` lists, as [["evidence", 1024]]: tables are Arrow IPC streams. A program

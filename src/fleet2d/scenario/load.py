@@ -78,7 +78,7 @@ def scenario_of(document: Document, folder: Path) -> Scenario:
 
 
 def _is_path(text: str) -> bool:
-    """Whether there is a file of that name; an override may be too long for a file name."""
+    """Return whether a text names a file; an override may be too long for a file name."""
     try:
         return Path(text).exists()
     except (OSError, ValueError):

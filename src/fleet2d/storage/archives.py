@@ -28,7 +28,7 @@ def read_arrays(path: Path, bound: Bound) -> dict[str, NDArray[Any]]:
 
     Raises:
         Exception: The file is damaged or forged: a damaged archive raises almost anything.
-        InputError: It is beyond the bound, or no regular file.
+        InputError: The file is beyond the bound, or no regular file.
     """
     content = read_bytes(path, bound)
     end = content.rfind(_END_MARK)

@@ -97,7 +97,7 @@ def open_bag(path: Path, failure: type[InputError] = InputError) -> Iterator[Any
         failure: The type of the error about a bag that can't be read.
 
     Raises:
-        InputError: It can't be read, or rosbags isn't installed.
+        InputError: The bag can't be read, or rosbags isn't installed.
     """
     types = ros_types("bags need rosbags")  # for bags without definitions of their own
     from rosbags.highlevel import AnyReader

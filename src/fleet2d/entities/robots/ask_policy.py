@@ -32,12 +32,12 @@ from fleet2d.kernels import F32, F64, TURN, UNIT, Bool
 from fleet2d.runtime.clock import DAY_MINUTES, DAY_S, HOUR_S
 from fleet2d.runtime.events import EventKind
 
-DOES: tuple[str, ...] = get_args(InteractionKind)
+REQUEST_KINDS: tuple[str, ...] = get_args(InteractionKind)
 
 ASK_COLUMNS = (
     # These describe the interaction and its open request.
     *("interaction", "open", "worth", "value", "time_left", "tries"),
-    *(f"do_{kind}" for kind in DOES),
+    *(f"do_{kind}" for kind in REQUEST_KINDS),
     # These describe its person, as the robot has seen them.
     *("in_view", "seen_30min", "seen_6h", "seen_now"),
     *(f"in_{kind}" for kind in KINDS),

@@ -86,7 +86,7 @@ class Sites:
         return plan
 
     def problem(self, now: Situation, prior: F64) -> SearchProblem:
-        """Return the search problem from where the robot is.
+        """Return the search problem from the robot's position.
 
         Args:
             now: The situation.
