@@ -1,6 +1,6 @@
 """Questions about the tables of a run: one SELECT in SQL, which reads nothing else.
 
-DuckDB answers without files, networks, extensions and settings. The syntax tree is checked before:
+DuckDB answers without files, networks, extensions and settings. The syntax tree is checked first:
 an unknown table, column, function or value is an error with the nearest name, since an answer
 without rows would look like the truth.
 """

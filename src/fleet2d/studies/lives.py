@@ -481,7 +481,7 @@ def _frame_of(path: Path) -> "pl.DataFrame":
 
 
 def _is_file(path: Path) -> bool:
-    """Return whether there is such a file; a text that is too long for a name is none."""
+    """Return whether a path is that of a file; a text too long for a name isn't."""
     try:
         return path.is_file()
     except OSError:

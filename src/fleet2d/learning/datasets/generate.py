@@ -310,7 +310,7 @@ def check_dataset(
         executor: Where they run, as for `map_runs`.
 
     Raises:
-        InputError: As `dataset`.
+        InputError: As for `dataset`.
     """
     root = Path(out)
     if (root / MANIFEST).is_file():

@@ -89,7 +89,8 @@ def _changes(day: RecordedDay) -> list[tuple[int, str]]:
 def private_days(days: Sequence[RecordedDay], seed: int, kind: str = "") -> list[RecordedDay]:
     """Return new days that are like recorded ones.
 
-    No new day repeats more of a recorded day than recorded days repeat of each other, or a time.
+    New days repeat no recorded time, and no more of a recorded day than recorded days repeat of
+    each other.
 
     Args:
         days: The recorded days of a kind.

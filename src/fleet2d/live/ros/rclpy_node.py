@@ -141,9 +141,7 @@ class RclpyAction:
         self._begin = begin
         self._cancel = cancel
         self._stamp = stamp
-        self._goals: dict[
-            str, tuple[ActionGoal, Any, Any]
-        ] = {}  # each goal with its handle and future
+        self._goals: dict[str, tuple[ActionGoal, Any, Any]] = {}  # goal, handle and future
         self._lock = threading.RLock()
         self._cls: Any = None
 
