@@ -372,3 +372,10 @@ def test_an_activity_that_goes_on_where_an_item_has_none_is_noted(activity, is_n
 
     notes = stored.manifest["notes"]
     assert is_noted == any("has no activity" in note for note in notes)
+
+
+def test_an_activity_that_began_before_the_run_is_known_from_its_first_step():
+    sleeps = {"at": "06:00", "place": "bedroom", "activity": "sleep"}
+    stored = run(one(agenda(sleeps)))
+
+    assert ["sleep"] == table(stored, "events", event="activity")["detail"].tolist()

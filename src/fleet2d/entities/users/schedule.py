@@ -149,6 +149,8 @@ class Schedule(Behavior):
             seat = seat_at(now.actor, entry.place) if entry.place else None
             if now.step or now.actor.entity.start or seat is not None:
                 _add(plan, entry)
+            elif entry.activity:  # which began before the run
+                plan.note(EventKind.ACTIVITY, entry.activity)
         self.until = next_midnight(now.time)
         for midnight in midnights(since, self.until):
             entries = self.week[midnight.weekday()]
