@@ -111,14 +111,14 @@ CODE = [
     Defence(
         "networks are listed as code",
         "configuration.trust",
-        "if text.endswith(NETWORK):  # it may compute for ever, and fill the memory",
+        "if text.endswith(NETWORK):  # a network may run for ever, or fill the memory",
         "if False:",
         "hostile/test_networks.py::test_networks_of_behaviors_and_of_models_are_listed_as_code",
     ),
     Defence(
         "a network has the suffix by which it is listed",
         "configuration.networks",
-        "if path.suffix != NETWORK:  # by which it is listed as code",
+        "if path.suffix != NETWORK:  # files that run are listed by this suffix",
         "if False:",
         "configuration/test_networks.py::test_a_network_by_another_name_is_not_read",
     ),
@@ -308,7 +308,7 @@ BOUNDS = [
     Defence(
         "so have files that grow",
         "bounds",
-        "bound.check(len(content), path, error)  # it may have grown in the meantime",
+        "bound.check(len(content), path, error)  # the file may have grown in the meantime",
         "pass",
         "test_bounds_of_input.py::test_a_file_that_has_grown_is_refused",
     ),
