@@ -294,7 +294,7 @@ def by_clock_of_run(log: Log, day: Day, clock: Clock) -> Log:
     midnight = midnight_of(clock.start) - _number_of(log, day, clock) * DAY
     if clock.zone is None or log.first_day == midnight.date():
         return log
-    move = _Move(log.first_day, midnight, clock.zone)
+    move = _DayShift(log.first_day, midnight, clock.zone)
     return cast("Log", log.moved(move.moments))  # of a union, the checker forgets which
 
 
@@ -310,7 +310,7 @@ def _number_of(log: ActivityLog | PositionLog, day: Day, clock: Clock) -> int:
     return day
 
 
-class _Move(NamedTuple):
+class _DayShift(NamedTuple):
     """The move of a log to other days: times since its first midnight become those of the run.
 
     Attributes:
