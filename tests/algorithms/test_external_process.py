@@ -122,7 +122,11 @@ def test_a_program_that_is_not_ready_is_quoted(tmp_path):
             "sys.exit('no more memory')",
             "ended with code 1 instead of answering 'update'; on stderr it wrote: no more memory",
         ),
-        ("time.sleep(60)", "didn't answer 'update' within 2 s and was ended"),
+        pytest.param(
+            "time.sleep(60)",
+            "didn't answer 'update' within 2 s and was ended",
+            marks=pytest.mark.slow,
+        ),
         ("print('hello', flush=True)", "which is not a line of JSON with a type"),
         ("say({'type': 'error', 'text': 'no rooms'})", "reports: no rooms"),
         ("say({'type': 'output'})", "expected 'share' (one for each room)"),

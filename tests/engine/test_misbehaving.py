@@ -246,6 +246,7 @@ class Stops(fleet2d.Algorithm):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "command"),
     some(

@@ -420,6 +420,7 @@ def test_a_map_of_many_cells_is_refused(tmp_path, storage):
     assert "has 64000000 pixels, and at most 16777216" in refusal(folder, read_map)
 
 
+@pytest.mark.slow
 def test_a_bomb_of_bz2_in_a_bag_of_ros_1_is_refused(tmp_path, monkeypatch):
     from rosbags.rosbag1 import Writer
 

@@ -55,6 +55,7 @@ def test_an_impossible_goal_is_told_with_its_reason(to, reason):
     assert reason in state.detail
 
 
+@pytest.mark.slow
 def test_goals_end_by_others_by_poses_by_steering_and_when_they_are_withdrawn():
     x, y = place()
     other = GOAL | {"id": "g2", "to": "bathroom_1"}
@@ -132,6 +133,7 @@ def test_a_robot_whose_battery_is_empty_is_blocked():
     assert states[-1].detail == "it can't move"
 
 
+@pytest.mark.slow
 def test_who_sends_a_datagram_hears_what_becomes_of_its_goal():
     peer = UdpPeer("127.0.0.1", 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:

@@ -241,6 +241,7 @@ def test_long_answers_are_cut_and_say_so(tables):
     assert answer(tables, many, -1)["shown"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("query", "message"),
     [

@@ -46,6 +46,7 @@ print(json.dumps([run.tables["events"]["event"].to_pylist(), run.metrics]))
 """
 
 
+@pytest.mark.slow
 def test_sources_have_no_bare_string_of_an_event_kind():
     paths = set(SOURCES.rglob("*.py")) - {Path(events.__file__)}
 

@@ -110,6 +110,7 @@ print(faults[1] - faults[0])
     assert 10 * kept < usual
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux counts the parent's memory, too")
 def test_peak_memory_is_not_that_of_the_process_that_started_this_one():
     """Workers of a driver with much memory were replaced after each call."""

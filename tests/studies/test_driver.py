@@ -65,6 +65,7 @@ def test_a_study_is_one_data_set_and_few_files(undisturbed_dir):
     ] == files  # fmt: skip
 
 
+@pytest.mark.slow
 def test_it_goes_on_where_it_was_interrupted(undisturbed_dir, tmp_path):
     folder = tmp_path / "study"
     ran = []

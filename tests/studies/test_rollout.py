@@ -38,6 +38,7 @@ def small(tmp_path_factory):
     return run(rollout(guards=guards), tmp_path_factory.mktemp("rollout") / "study")[1]
 
 
+@pytest.mark.slow
 def test_robots_do_the_same_until_their_stage_and_something_else_then(small):
     rows = small.polars("daily").filter(metric="distance.astro").collect()
     stages = dict(small.variants.select("robot", "stage").iter_rows())

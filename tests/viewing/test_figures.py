@@ -154,6 +154,7 @@ def test_the_log_of_a_robot_is_printed_or_written(fleet2d, run_dir, tmp_path):
     assert out == (tmp_path / "astro.log").read_text()
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_failure_says_what_failed_and_marks_it(tmp_path):
     content = scenario(
         "5 min",

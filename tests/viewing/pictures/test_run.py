@@ -165,6 +165,7 @@ def test_colour_that_is_given_is_used(tmp_path):
     assert trace_of(run, run.plan, "astro", 0, robot=True).color.startswith("#")
 
 
+@pytest.mark.slow
 def test_areas_that_a_robot_keeps_out_of_are_hatched_and_named():
     corners = [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]
     run = base(f"robots.astro.keep_out=[{{area: {corners}, during: '22:00-07:00'}}]")
@@ -298,6 +299,7 @@ def half_an_hour(plan):
     return fleet2d.run({"simulation": simulation, "floorplan": plan, "users": {"ana": ana}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1.9, 1.6), (30.0, 25.0), (25.0, 3.0), (3.0, 25.0)])
 def test_words_of_the_scale_are_above_the_legend(tmp_path, monkeypatch, size):
     run = half_an_hour(saved_plan(tmp_path / f"{'2deaa98e' * 4}.json", *size))
