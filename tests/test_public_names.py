@@ -2,6 +2,7 @@
 
 import re
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,14 @@ def test_stub_has_the_public_names_with_their_modules():
         assert getattr(import_module(module), name) is getattr(fleet2d, name)
 
 
+NEEDED = {
+    "fleet2d.learning.gym": "gymnasium",
+    "fleet2d.learning.datasets.training": "torch",
+    "fleet2d.learning.datasets.torch_data": "torch",
+}
+"""Libraries of extras that modules need, where tests may run without them."""
+
+
 def test_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'Roomba'"):
         fleet2d.Roomba  # noqa: B018
@@ -44,10 +53,10 @@ def test_documented_modules_are_named_as_public():
         documented |= set(re.findall(r"^(?:from|import) (fleet2d[\w.]*)", text, re.MULTILINE))
 
     assert documented - {"fleet2d"}
-    for module in documented:
-        if module.startswith("fleet2d.learning.gym"):
-            pytest.importorskip("gymnasium", reason="needs the extra gym")
-        import_module(module)
+    for module in sorted(documented):
+        needed = [library for begin, library in NEEDED.items() if module.startswith(begin)]
+        if all(map(find_spec, needed)):
+            import_module(module)
         assert f"`{module}`" in page, (
             f"{module} is documented, and docs/reference/api.md doesn't list it"
         )
