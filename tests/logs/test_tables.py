@@ -146,8 +146,8 @@ def test_seconds_count_in_the_unit_that_the_column_names(tmp_path):
     assert log.time_us.tolist() == [1_500_000, 3_000_000]
 
 
-def test_seconds_in_the_range_of_days_of_a_spreadsheet_are_seconds(tmp_path):
-    log = positions(csv(tmp_path, "time,x,y\n45383.3,1,2\n45383.4,1,3\n"))
+def test_seconds_in_the_range_of_days_of_a_spreadsheet_are_named_so(tmp_path):
+    log = positions(csv(tmp_path, "time_s,x,y\n45383.3,1,2\n45383.4,1,3\n"))
 
     assert log.time_us.tolist() == [45_383_300_000, 45_383_400_000]
 
@@ -175,6 +175,7 @@ def test_headings_in_radians_or_degrees_as_the_column_names(tmp_path):
         ("time,x,y\n1.77261E+12,1,2\n1.77261E+12,1,3\n", "line 2: expected a time"),
         ("time,x,y\n080000,1,2\n080001,1,3\n", "line 2: expected a time"),
         ("time,x,y\n45383.33333,1,2\n45383.33403,1,3\n", "line 2: .* days of a spreadsheet, 2024-04-01 08:00:"),
+        ("time,x,y\n45383.5,1,2\n45384.25,1,3\n", "the time 45383.5 may be days of a spreadsheet, 2024-04-01 12:00"),
         ("time,x,y\n08:00:00,1,2\n", "expected a time like"),
         ("time,x [mm],y\n1,1,2\n", "x and y have different units"),
         ("time,x [px],y [px]\n1,1,2\n", r"has no column 'x'; it has: time, x \[px\], y \[px\]"),

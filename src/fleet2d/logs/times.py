@@ -36,8 +36,8 @@ SINCE_1970_S = 1e8
 # Spreadsheets count days since this one; of 2000 to 2099 in such numbers.
 SPREADSHEET_EPOCH = datetime(1899, 12, 30)
 SPREADSHEET_DAYS = (36526, 73051)
-# No tracker stores a position more often than each 5 ms; as days these are 7 min.
-DENSEST_S = 0.005
+# A log of days lasts so long at most; one of seconds that is as short begins at 0, as a rule.
+SPREADSHEET_SPAN = 400
 """Fewer seconds count from the beginning of the log."""
 
 
@@ -332,22 +332,23 @@ def parse_numbers(
 
 
 def _check_days(numbers: F64, path: Path, line: I64) -> None:
-    """Refuse days of a spreadsheet, which would be taken for seconds.
+    """Refuse numbers that may be days of a spreadsheet as well as seconds.
 
     Raises:
-        LogError: The numbers are in the range of such days, and too dense for seconds.
+        LogError: They are fractions in the range of such days, and of less than 400 days.
     """
-    least, end = SPREADSHEET_DAYS
-    steps = np.diff(numbers[:1000])
-    steps = steps[steps > 0]
-    if not len(steps) or np.median(steps) > DENSEST_S:
+    if not len(numbers):
         return
-    if numbers.min() >= least and numbers.max() < end:
-        date = SPREADSHEET_EPOCH + timedelta(minutes=round(float(numbers[0]) * 1440))
+    least, end = SPREADSHEET_DAYS
+    first = float(numbers.min())
+    last = float(numbers.max())
+    is_whole = not (numbers % 1).any()
+    if least <= first and last < end and last - first < SPREADSHEET_SPAN and not is_whole:
+        date = SPREADSHEET_EPOCH + timedelta(minutes=round(first * 1440))
         raise LogError(
-            f"{path}, line {line[0]}: the time {numbers[0]:.10g} looks like days of a spreadsheet,"
-            f" {date:%Y-%m-%d %H:%M}: write times as text, or name the column time_s if these are"
-            " seconds"
+            f"{path}, line {line[numbers.argmin()]}: the time {first:.10g} may be days of a"
+            f" spreadsheet, {date:%Y-%m-%d %H:%M}: write times as text, or name the column time_s"
+            " if these are seconds"
         )
 
 
