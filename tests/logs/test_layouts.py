@@ -424,6 +424,19 @@ def test_sensors_whose_states_are_rooms_are_named_where_no_id_chooses_one(tmp_pa
         read_log(path)
 
 
+def test_a_sensor_of_a_room_that_is_unavailable_is_a_gap_that_a_note_tells(tmp_path):
+    states = [("kitchen", "08:00"), ("unavailable", "09:00"), ("hall", "10:00"), ("hall", "11:00")]
+    rows = [f"sensor.ana_room,{state},2026-03-02 {time}:00" for state, time in states]
+    path = written(tmp_path / "history.csv", ["entity_id,state,last_changed", *rows])
+
+    log = read_log(path, id="sensor.ana_room")
+
+    assert [("kitchen", 8, 9), ("hall", 10, 11)] == [
+        (r.room, r.begin_us // (3600 * S), r.end_us // (3600 * S)) for r in log.readings[:2]
+    ]
+    assert log.notes == ("left out as unavailable or unknown: 1 state",)
+
+
 def test_a_stay_that_a_sensor_tells_lasts_until_the_end_of_the_log_days_later(tmp_path):
     rows = ["entity_id,state,last_changed", "sensor.ana_room,kitchen,2026-03-02 08:00:00"]
     path = written(tmp_path / "history.csv", [*rows, "light.hall,on,2026-03-04 09:00:00"])

@@ -107,7 +107,8 @@ def read_states(
     first_day = min(state.time for state in states).date()
     if tells_room:
         readings = _stays(states, str(id), begin)
-        others: Counter[str] = Counter()
+        words = [state.state.strip().lower() for state in states if state.entity == id]
+        others = Counter("unavailable" for word in words if word in _UNKNOWN)
     else:
         readings, others = _shown(states, person, begin)
     gone = others.pop("unavailable", 0)
