@@ -19,6 +19,7 @@ from fleet2d.interactions.answers import ASLEEP, LOADS, PRIVATE_ROOMS, ActivityP
 from fleet2d.interactions.interaction import Outcome
 from fleet2d.kernels import I64, Bool
 from fleet2d.metrics.metric import Metric
+from fleet2d.metrics.robots import BREAKS, ENDS
 from fleet2d.runtime.clock import DAY_S, HOUR_S
 from fleet2d.runtime.events import Event, EventKind
 
@@ -42,12 +43,7 @@ TERMS = {
 }
 """What is counted for each robot, and in which unit."""
 
-SEARCH_ENDS = frozenset(
-    {
-        EventKind.FOUND, EventKind.GAVE_UP, EventKind.NOT_AT_HOME,
-        EventKind.FIND_BEGINS, EventKind.POWER_OFF,
-    }
-)  # fmt: skip
+SEARCH_ENDS = frozenset((*ENDS, *BREAKS))
 """What ends a search: its outcome, the next one, or going off."""
 
 
