@@ -162,6 +162,12 @@ def test_shares_of_the_variance_name_what_matters_and_last_what_no_axis_explains
     assert 1 == pytest.approx(table["share"].sum())
 
 
+def test_shares_of_the_variance_of_a_metric_called_count_are_those_of_any_other():
+    frame = variants(noise=3.0)
+    counted = Answers(frame.rename({"score": "count"})).shares("count")
+    assert counted.equals(Answers(frame).shares("score"))
+
+
 def test_shares_of_nothing_are_zero_and_no_rounding_errors():
     table = Answers(variants(effect=0, noise=0)).shares("score")
     shares = dict(table.iter_rows())

@@ -397,9 +397,9 @@ def _between(frame: "pl.DataFrame", metric: str, *columns: str) -> float:
     import polars as pl
 
     groups = frame.group_by(columns, maintain_order=True)
-    cells = groups.agg(pl.col(metric).mean(), count=pl.len())
+    cells = groups.agg(pl.col(metric).mean(), pl.len().alias("variants in cell"))
     mean = float(frame[metric].mean())
-    squares = cells["count"] * (cells[metric] - mean) ** 2
+    squares = cells["variants in cell"] * (cells[metric] - mean) ** 2
     return sum_in_order(squares.to_list())
 
 
